@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from himpc.catalog import qp_method
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
-from lessons.settings.period import swings
+from lessons.settings.period import warning
 from lessons.settings.values import peak
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ def block(recording: Recording) -> dict[str, Any]:
         "dynamic_leak_max": peak(recording["dynamic_leak"]),
         "bound_active_share": float((recording["at_bound"] > 0).any(axis=1).mean()),
         "late_ticks": int(recording["late"].sum()),
-        "period_too_long": swings(recording.session.robot, settings) or None,
+        "warning": warning(recording.session.robot, settings) or None,
         "contact": _contact(recording),
     }
 

@@ -27,7 +27,7 @@ from lessons.session.leak import at_once, dynamic_leak
 from lessons.session.observed import observed
 from lessons.session.session import Session
 from lessons.session.targets import carried, kept, move_target, target_at
-from lessons.settings.period import check_period, swings
+from lessons.settings.period import check_period, warning
 from lessons.settings.settings import SceneSettings
 from lessons.settings.stack import same_tasks
 from lessons.settings.torque import TorqueSettings
@@ -158,8 +158,8 @@ class TorqueSession(Session):
             self.references, self.plan, self.controller_input = references, None, None
             self._arrange(layout)
         before, self.settings = self.settings, settings
-        told = swings(self.robot, settings)
-        if told and not swings(self.robot, before):
+        told = warning(self.robot, settings)
+        if told and not warning(self.robot, before):
             self.notices.append(told)
 
     def _hand_over(self, taking: Controller) -> None:

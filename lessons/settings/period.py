@@ -1,4 +1,4 @@
-"""Which control periods are short enough for time-delay estimation with the robot's M̄."""
+"""Which control periods suit time-delay estimation with the robot's M̄, gains and sensors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from himpc.catalog import CONTROLLERS, WITH_MODEL
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Robot, tracking_bandwidth
 from robots.inertia import SLOW, mass_matrix
-from robots.truth import true_model
+from robots.truth import encoder_resolution, true_model
 
 USUAL = 1e-3
 """s: the papers' period. It and shorter ones are never refused: lessons change M̄ with it."""
@@ -31,12 +31,13 @@ def longest_period(robot: Robot, settings: TorqueSettings) -> float:
     return _bandwidth(robot, settings, SLOW)
 
 
-def swings(robot: Robot, settings: TorqueSettings) -> str:
-    """Returns one sentence if the robot swings with these settings, as T_s is too long for M̄ or for the
-    gains; otherwise "".
+def warning(robot: Robot, settings: TorqueSettings) -> str:
+    """Returns one sentence if the robot swings or shakes with these settings, as T_s is too long for M̄ or
+    for the gains, or too short for the sensors; otherwise "".
 
     With the lag l of its acceleration, (4) is the third-order loop l x⃛ + ẍ + K_v ẋ + K_p x = 0, which is
-    stable if l K_p < K_v.
+    stable if l K_p < K_v. One digit δ of a sensor changes the torque by M̄δ/T_s², which must be less than the
+    motor has.
     """
     longest, T_s = longest_period(robot, settings), settings.T_s
     if T_s > longest:
@@ -54,13 +55,27 @@ def swings(robot: Robot, settings: TorqueSettings) -> str:
                 f"estimation lags by {1e3 * lag:.2g} ms, and the robot swings. Choose a smaller K_p, a "
                 "larger K_v or a shorter T_s."
             )
-    return ""
+    return _too_coarse(robot, settings) if longest < math.inf and settings.plant.saturate else ""
+
+
+def _too_coarse(robot: Robot, settings: TorqueSettings) -> str:
+    limits, resolution = settings.limits, encoder_resolution(robot, settings.plant)
+    change = np.array(settings.M_bar) * settings.M_bar_scale * resolution / settings.T_s**2
+    bound = robot.tau_limit * (min(limits.torque_scale, 1.0) if limits.torque else 1.0)
+    worst = int(np.argmax(change / bound))
+    if change[worst] <= bound[worst]:
+        return ""
+    return (
+        f"One digit of the encoder of {robot.joint_names[worst]} changes the torque by M̄ δ/T_s² = "
+        f"{change[worst]:.3g} N·m, and the limit is {bound[worst]:.3g} N·m: the robot shakes, and may not "
+        "keep its distances. Choose a longer T_s, a smaller M̄ or finer encoders."
+    )
 
 
 def check_period(robot: Robot, settings: TorqueSettings) -> None:
     """Raises InputError if T_s is longer than `USUAL` and than `longest_period`."""
     if settings.T_s > max(USUAL, longest_period(robot, settings)):
-        raise InputError(swings(robot, settings))
+        raise InputError(warning(robot, settings))
 
 
 def _bandwidth(robot: Robot, settings: TorqueSettings, T_s: float) -> float:

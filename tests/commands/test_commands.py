@@ -280,7 +280,7 @@ def test_settings_with_which_the_robot_swings_are_named(capfd: pytest.CaptureFix
         last = capfd.readouterr().out.strip().splitlines()[-1]
         assert last.startswith(words) and ("time-delay estimation lags" in last) == bool(words)
     assert main(["run", "panda-hold", "--set", "M_bar_scale=0.4", "--duration", "0.02", "--json", "-"]) == 0
-    assert "Choose at most 0.82 ms" in json.loads(capfd.readouterr().out)["period_too_long"]
+    assert "Choose at most 0.82 ms" in json.loads(capfd.readouterr().out)["warning"]
     assert main(["run", "panda-hold", "--set", "T_s=0.02", "--duration", "0.02"]) == 2
     told = capfd.readouterr().err
     assert "T_s = 20 ms is too long for panda" in told and "Choose at most 2.1 ms" in told

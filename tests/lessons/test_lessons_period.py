@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 from lessons.events import MoveTarget, Set
+from lessons.recording.run import run
 from lessons.runs.check import check_scene
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
-from lessons.settings.period import USUAL, longest_period, swings
+from lessons.settings.period import USUAL, longest_period, warning
 from robots import InputError
+
+DEEP = (0.606, 0.05, 0.098)
+"""Below the surface of the table, m."""
 
 
 @pytest.mark.parametrize(("name", "longest"), [
@@ -81,7 +85,7 @@ def test_gains_that_are_too_large_for_the_lag_are_told() -> None:
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "hold"])
 def test_no_scene_swings_as_it_is(name: str) -> None:
     scene = torque_scene(name)
-    assert scene.settings.T_s <= USUAL and swings(scene.robot, scene.settings) == ""
+    assert scene.settings.T_s <= USUAL and warning(scene.robot, scene.settings) == ""
 
 
 def test_codes_with_a_model_or_own_controllers_keep_their_period() -> None:
@@ -115,3 +119,23 @@ def test_a_scene_of_ones_own_may_show_what_a_notice_is_about() -> None:
     check_scene(replace(scene, events=((0.0, Set("M_bar_scale", 0.3)), (1.0, Set("M_bar_scale", 1.0)))))
     with pytest.raises(InputError, match="T_s = 10 ms is too long for panda"):
         check_scene(replace(scene, events=((0.0, Set("M_bar_scale", 0.3)), (1.0, Set("T_s", 0.01)))))
+
+
+@pytest.mark.parametrize(("change", "touches"), [
+    ((), True), (("M_bar_scale=0.5",), False), (("T_s=0.002",), False),
+    (("limits.torque=false", "plant.saturate=false"), False),
+], ids=str)  # fmt: skip
+def test_sensors_that_are_too_coarse_for_the_motors_are_told(change: tuple[str, ...], touches: bool) -> None:
+    """With encoders of 0.1°, one digit changes the torque of joint 2 by 366 N·m of 320 N·m: the motors are
+    often at their limits, and the iiwa touches the table with hundreds of N although it keeps distances. It
+    does not with half of M̄, with twice the period, or without torque limits."""
+    coarse = ("plant.encoder_resolution_deg=0.1", *change)
+    session = begin(RunSpec("iiwa14-table", set=change).prepared())
+    session.post(Set("plant.encoder_resolution_deg", 0.1))
+    session.tick()
+    told = [notice for notice in session.notices if "One digit of the encoder of joint_2" in notice]
+    assert len(told) == len(session.notices) == int(touches)
+    scene = RunSpec("iiwa14-table", set=coarse).prepared()
+    events = ((0.0, MoveTarget("position", DEEP)),)
+    force = run(replace(scene, events=events), 3.0)["contact_force"].max()
+    assert force > 100.0 if touches else force == 0.0
