@@ -85,8 +85,7 @@ def heavy(length: float) -> Robot:
 
 def test_a_long_arm_has_the_time_that_its_target_needs() -> None:
     """The target moves with 0.5 m/s, and needs more than the 2 s of a short drag for 1.05 m. An arm of 6.7 m
-    150 mm
-    behind, as its target was."""
+    was 150 mm behind, as its target was."""
     motion = dragged(heavy(1.75))
     assert motion.drag > 1.0 and motion.follows and motion.rest, str(motion)
     assert " after 3.1 s (drag of 1050 mm)" in str(motion) and Motion(0.3).seconds == 2.0
