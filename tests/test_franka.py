@@ -26,7 +26,7 @@ from himpc.export.native import NativeController, build
 from lessons.events import MoveTarget
 from lessons.recording.run import run as run_scene
 from lessons.scenes.catalog import as_torque_scene, prepared, torque_scene
-from lessons.scenes.run_spec import NOT_EXPORTED, RunSpec
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError, Plant, PlantSettings
 from tests.commands.exported import needed
 
@@ -67,7 +67,7 @@ class Bench:
 
     def __init__(self, folder: Path) -> None:
         needed("cc")
-        self.scene = as_torque_scene(prepared(torque_scene("panda-hold"), None, NOT_EXPORTED), "it")
+        self.scene = as_torque_scene(prepared(torque_scene("panda-hold"), None, ()), "it")
         self.image, self.session = image_at(self.scene, self.scene.q_0)
         self.make = partial(NativeController.of, build(folder), self.image)
         self.limits = SimulatedArm(self.plant(), T_S).limits.with_robot(self.scene.robot, self.scene.q_0)
@@ -140,7 +140,7 @@ def test_an_arm_that_compensates_gravity_moves_as_the_lab_does(bench: Bench) -> 
     A drag of 7 cm gives the same motion in both."""
     (drag,) = drags = bench.drags((0.051, "position", 0.05, 0.0, -0.05))
     spec = RunSpec("panda-hold", events=((0.05, MoveTarget("position", tuple(drag[2].tolist()))),))
-    lab = run_scene(spec.for_export().but("plant.contacts=false", "plant.joint_stops=false").prepared(), 0.6)
+    lab = run_scene(spec.but("plant.contacts=false", "plant.joint_stops=false").prepared(), 0.6)
     ended, rows, arm = bench.run(drags=drags)
     assert ended.gently
     q, wanted = rows["q"][1:600], lab["q"][:599]

@@ -361,7 +361,10 @@ COMPILED = {
         *("tick", "tick/kernel", "plan", "formulation", "printed", "cascade", "limits", "prediction"),
         *("stack", "tasks", "kinematics", "references", "qp", "catalog", "constants"),
     ),
-    "export/kernel": ("tick/kernel", "tick", "controllers", "limits", "cascade", "compilation", "qp"),
+    "export/kernel": (
+        *("tick/kernel", "htmpc/kernel", "tick", "controllers", "limits", "cascade", "compilation", "qp"),
+        "constants",
+    ),
     "export": (
         *("export/kernel", "tick", "tick/kernel", "compilation", "controllers", "formulation", "cascade"),
         *("limits", "references", "tasks", "stack"),

@@ -64,6 +64,7 @@ def export(
     from lessons.own.files import is_file
     from lessons.scenes.catalog import as_torque_scene
     from lessons.scenes.run_spec import RunSpec, tip_with_tool
+    from lessons.session.observed import objects_of
     from lessons.session.torque import TorqueSession
     from robots.mechanics.saving import saved
 
@@ -87,11 +88,11 @@ def export(
     assignments = (*([f"stack={stack}"] if stack is not None else ()), *set)
     tip = tip_with_tool(tip, tool)
     spec = RunSpec(scene, urdf, tip, controller=controller, seed=seed, hold=hold).but(*assignments)
-    loaded = as_torque_scene(spec.for_export().prepared(), "export's")
-    if loaded.settings.limits != as_torque_scene(spec.prepared(), "export's").settings.limits:
-        print(WITHOUT, flush=True)
+    loaded = as_torque_scene(spec.prepared(), "export's")
     session = TorqueSession(replace(loaded, events=()), seed)
-    image = image_of(session.controller, loaded.robot, session.references, budget)
+    image = image_of(
+        session.controller, loaded.robot, session.references, budget, observed=objects_of(session.plant)
+    )
     force = in_force(loaded.robot, loaded.settings.for_controller().limits)
     torques = [
         max(*pair) for pair in zip(loaded.robot.tau_limit.tolist(), force.tau_upper.tolist(), strict=True)
@@ -106,12 +107,6 @@ def export(
         print(f"{len(content):9,} bytes  {folder / name}")
     print(f"build and replay: see {folder / 'README.md'}")
     return 0
-
-
-WITHOUT = (
-    "note: distances and the guard of a blocked robot are not exported; this controller does not avoid "
-    "objects, and presses against them with up to all the torque of its motors"
-)
 
 
 def recorded(scene: TorqueScene, ticks: int, seed: int) -> Recorded:

@@ -71,7 +71,7 @@ def write(site: Path) -> None:
     (out / "kernel.js").write_text(wrapped("kernel", linked(object_code(target_named("wasm32")))))
     robots: dict[str, Any] = {}
     for name in TRIED:
-        scene = as_torque_scene(RunSpec(name).for_export().prepared(), "a live page's")
+        scene = as_torque_scene(RunSpec(name).prepared(), "a live page's")
         pack = Pack()
         told = {"scene": scene_data(scene, pack, HORIZONS, wide=True)}
         (out / f"{name}.js").write_text(pack.script(f"scene/{name}", told))
@@ -111,6 +111,6 @@ def about() -> str:
         f"Kernel {layout_number():014x} of himpc-lab {version('himpc-lab')}, commit {told}, as WebAssembly. "
         f"MuJoCo @mujoco@ simulates the robot; himpc-lab uses MuJoCo {mujoco.__version__}. Unlike himpc-lab, "
         "this page has no controllers that need Python (OSF, HQP, HTMPC), no added tasks, no recordings, no "
-        "drawings of the QP, and it lacks three rare fallbacks. To open the code in himpc-lab: himpc-lab "
+        "drawings of the QP, and it lacks a rare fallback. To open the code in himpc-lab: himpc-lab "
         "--state CODE."
     )

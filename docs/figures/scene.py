@@ -20,10 +20,11 @@ from himpc.tasks.axes import OnAxes
 from lessons.events import Event, Push, as_data
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.controllers import controller_of
+from lessons.session.observed import objects_of
 from lessons.session.torque import TorqueSession
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Robot
-from robots.world import Floor
+from robots.world import Floor, Post
 
 
 def scene_data(
@@ -41,7 +42,8 @@ def scene_data(
         InputError: the scene's controller cannot be exported.
     """
     settings, robot = scene.settings, scene.robot
-    references = TorqueSession(replace(scene, events=()), 0).references
+    session = TorqueSession(replace(scene, events=()), 0)
+    references, around = session.references, objects_of(session.plant)
     force = settings.limits
     plant = {each.name: getattr(settings.plant, each.name) for each in fields(settings.plant)}
     own = tuple(level.name for level in settings.levels)
@@ -50,7 +52,7 @@ def scene_data(
         changed = settings.changed("horizon", N)
         assert isinstance(changed, TorqueSettings)
         # A simulation may have any limits that himpc-lab's settings have.
-        made[N] = image_of(controller_of(changed, robot), robot, references, multiple=math.inf)
+        made[N] = image_of(controller_of(changed, robot), robot, references, None, math.inf, around)
         images[str(N)] = _told(made[N], pack)
     image = made[settings.horizon]
     targets = {task["name"]: task["target"] for task in image.manifest["tasks"]}
@@ -89,6 +91,7 @@ def scene_data(
         "model": model_text(robot, scene.world),
         "poses": _poses(scene),
         "objects": _objects(scene),
+        "free": _free(scene),
         "events": [{"t": t, **_event(robot, event)} for t, event in scene.events],
         "images": images,
         "fields": _fields(image),
@@ -158,11 +161,21 @@ def _objects(scene: TorqueScene) -> list[dict[str, Any]]:
     return found
 
 
+def _free(scene: TorqueScene) -> list[dict[str, float]]:
+    """Returns index and height of the known point above the middle, m, of the objects that can move. They are
+    in the order of MuJoCo's free joints."""
+    return [
+        {"index": index, "above": -0.5 * thing.shape.height if isinstance(thing.shape, Post) else 0.0}
+        for index, thing in enumerate(scene.world)
+        if thing.free
+    ]
+
+
 def _told(image: Image, pack: Pack) -> dict[str, Any]:
     """Returns the memory, and those parts of its manifest that the page needs."""
     manifest = image.manifest
     kept = [{key: each[key] for key in ("name", "type", "shape", "offset")} for each in manifest["arrays"]]
-    told = {key: manifest[key] for key in ("joints", "digest", "tasks", "levels")}
+    told = {key: manifest[key] for key in ("joints", "digest", "tasks", "levels", "objects")}
     return {"memory": pack.add(image.memory), "manifest": told | {"arrays": kept}}
 
 

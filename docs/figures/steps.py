@@ -112,7 +112,7 @@ def robots_of(lesson: Lesson) -> dict[str, Any]:
 
 
 def _scene_of(run: RunSpec) -> TorqueScene:
-    scene = _prepared(run.for_export())
+    scene = _prepared(run)
     if not isinstance(scene, TorqueScene):
         raise InputError("HTMPC runs at velocity level; its solver is not exported")
     return scene

@@ -22,7 +22,7 @@ from examples.franka.simulated import Model, SimulatedArm, hurry, watch
 from himpc.export.image import Image, image_of
 from himpc.export.native import NativeController, build
 from lessons import load_scene, prepared
-from lessons.scenes.run_spec import NOT_EXPORTED
+from lessons.session.observed import objects_of
 from lessons.session.torque import TorqueSession
 from robots import InputError, Plant
 from robots.errors import unknown_name
@@ -54,7 +54,8 @@ def image_at(scene: Any, start: Array) -> tuple[Image, TorqueSession]:
     still = replace(scene.settings, plant=replace(scene.settings.plant, gravity=False))
     rest = replace(scene, settings=still, q_0=start, v_0=np.zeros(scene.robot.n), tau_0=None, events=())
     session = TorqueSession(rest)
-    return image_of(session.controller, scene.robot, session.references), session
+    around = objects_of(session.plant)
+    return image_of(session.controller, scene.robot, session.references, observed=around), session
 
 
 def check_start(controller: NativeController, start: Array) -> None:
@@ -102,7 +103,7 @@ def main(
         npz: file for one row per period.
     """
     loaded = load_scene(scene)
-    changed: Any = prepared(loaded, None, (*NOT_EXPORTED, *set))
+    changed: Any = prepared(loaded, None, set)
     period, described, simulated = changed.settings.T_s, changed.robot, robot == "simulated"
     if not (0.0 < duration <= 600.0 and 0 <= delay <= 20 and (simulated or period == 1e-3)):
         raise InputError("--duration must be above 0 and at most 600 s, --delay from 0 to 20, T_s 0.001 s")

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from himpc.constants import PROGRESS
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce
-from himpc.limits.windup import Windup, free, largest_error, stopped, taken_back, wound_up
 from himpc.tick.distances import Anywhere, Distances, carried
 from himpc.tick.kernel.slow_down import slow_down
+from himpc.tick.kernel.windup import resist_windup_of, taken_back
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -72,18 +72,20 @@ class StallGuard:
 @final
 class WindupGuard:
     """Guards a robot without distances. It slows joints down like a guard with distances whose obstacle is
-    always near, and stops a robot that presses.
+    always near, and stops a robot that presses, see `tick.kernel.windup`.
 
     Attributes:
         errors, fastest: as for `StallGuard`.
-        windup: the degree to which the torque is wound up; None before the first tick.
+        largest_error: the largest error on which tasks act at this tick, m or rad.
     """
 
     def __init__(self, stall: StallGuard, robot: Robot, M_bar: Array, margin: float, T_s: float) -> None:
         """stall: the guard for an obstacle that is near. M_bar: (n,) kg·m². margin: see `Avoidance`."""
         self._stall, self._around, self._T_s = stall, Anywhere(carried(robot), margin), T_s
-        self._v_limit, self._largest = robot.v_limit, taken_back(M_bar, robot.v_limit, T_s)
-        self.windup: Windup | None = None
+        self._v_limit, self._largest = np.array(robot.v_limit), taken_back(M_bar, robot.v_limit, T_s)
+        self._tau: Array | None = None
+        self._wound, self._windup = np.zeros(robot.n), np.array((0.0, 1.0))
+        self.largest_error = stall.largest_error
 
     @property
     def errors(self) -> Array | None:
@@ -103,16 +105,15 @@ class WindupGuard:
 
     def limits(self, limits: LimitsInForce, tau: Array, v: Array, _: object) -> LimitsInForce:
         """Returns the limits in force at this tick, see `StallGuard.limits`."""
-        moves = self.fastest > PROGRESS
-        before = free(tau) if self.windup is None else self.windup
-        self.windup = wound_up(before, tau, v, self._largest, self._v_limit, moves, self._T_s)
-        return stopped(self._stall.limits(limits, tau, v, self._around), self.windup)
-
-    @property
-    def largest_error(self) -> float:
-        """The largest error on which tasks act at this tick, m or rad."""
-        pressing = math.inf if self.windup is None else largest_error(self.windup)
-        return min(self._stall.largest_error, pressing)
+        if self._tau is None:
+            self._tau = np.array(tau)
+        slowed = self._stall.limits(limits, tau, v, self._around)
+        pressing = resist_windup_of(
+            *(self._largest, self._v_limit, tau, v, self.fastest > PROGRESS, self._T_s),
+            *(self._tau, self._wound, self._windup, slowed.v_limit),
+        )
+        self.largest_error = min(self._stall.largest_error, pressing)
+        return slowed
 
 
 def guard_of(settings: Settings, tasks: int, robot: Robot) -> StallGuard | WindupGuard | None:

@@ -8,7 +8,10 @@ import struct
 from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, intermediate
 from himpc.export.kernel.whole_tick import RESET, TICK, control
 
-ARRAYS = ("data", "where", "whole", "whole_where", "loop", "loop_where")
+ARRAYS = (
+    *("data", "where", "whole", "whole_where", "loop", "loop_where"),
+    *("pairs", "pairs_where", "pairs_whole", "pairs_whole_where"),
+)
 """The arrays of a controller, in the order of the arguments of `control`."""
 MAGIC, LAYOUT, SIZE, JOINTS, FIRST = range(5)
 """Indices of the words at the beginning of a controller's memory: a constant that marks such a memory, the
@@ -26,7 +29,10 @@ _START, _PRIME = 0xCBF29CE484222325, 0x100000001B3
 EXPORTED = ("himpc_tick", "himpc_reset", "himpc_set", "himpc_check")
 """The functions of the object file, unless their names begin with another prefix than PREFIX."""
 PREFIX = "himpc"
-_TYPES = (VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, WHOLE, WHOLE, VECTOR, VECTOR, VECTOR, VECTOR)
+_TYPES = (
+    *(VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, VECTOR, INDICES, INDICES, INDICES),
+    *(WHOLE, WHOLE, VECTOR, VECTOR, VECTOR, VECTOR),
+)
 _ARRAY = "ptr, ptr, i64, i64, ptr, i64, i64"
 
 
@@ -57,7 +63,7 @@ def entries_text(control_name: str, layout: int) -> str:
         # An exported controller reads no clock, and the times of its levels are zero.
         "define i32 @clock_gettime(i32 %clock, i64 %stamp) {\n  ret i32 -1\n}\n"
         f"declare i32 @{control_name}(ptr, ptr, "
-        f"{', '.join([_ARRAY] * 6)}, i64, i64, {', '.join([_ARRAY] * 4)})\n"
+        f"{', '.join([_ARRAY] * len(ARRAYS))}, i64, i64, {', '.join([_ARRAY] * 4)})\n"
         + _entry(
             "himpc_tick",
             "ptr %q, ptr %v, ptr %tau_applied, ptr %tau",

@@ -30,13 +30,19 @@ from himpc.export.kernel.loop_arrays import (
     BUDGET,
     DAMPS,
     DRAGGABLE,
+    GUARD,
+    LARGEST_ERROR,
     LEVELS,
+    MARGIN,
     MOST,
     ON_ACCELERATION,
+    PRESSING,
     ROWS,
     SHAPES,
     SIMPLE,
+    STALL,
     TOLERANCE,
+    UNGUARDED,
     WIDTH,
     LoopArrays,
     sizes_of,
@@ -47,9 +53,11 @@ from himpc.formulation.forms import StackForm, prepare, stack_form
 from himpc.formulation.settings import Settings
 from himpc.limits import in_force
 from himpc.references import Reference, Target
+from himpc.references.observed import NOTHING, Observed
 from himpc.stack import DAMPING_LEVEL, freedom_left
 from himpc.tasks import Damping, Task
 from himpc.tick.configure import Span, arena_for, write_curve, write_limits
+from himpc.tick.distances import Distances, carried, pair_memory
 from himpc.tick.kernel.arena import Arena, laid_out
 from himpc.tick.kernel.arrays import NUMBERS, WHOLES, Array, TickArrays
 from himpc.tick.tables import LevelTable, budget_of
@@ -84,6 +92,7 @@ def image_of(
     references: Mapping[str, Reference],
     budget: float | None = None,
     multiple: float = MULTIPLE,
+    observed: Observed = NOTHING,
 ) -> Image:
     """Returns the memory of a controller before its first period.
 
@@ -93,6 +102,7 @@ def image_of(
         references: the references of all tasks by name, before the first period.
         budget: largest number of multiplications for changes of active rows in a period; None: `budget_of`.
         multiple: see MULTIPLE. With an infinite number, a simulation may set any limits, also infinite ones.
+        observed: the objects around the robot, in the order of OBJECT.
 
     Raises:
         InputError: the controller uses something that cannot be exported.
@@ -129,6 +139,12 @@ def image_of(
         f["table"][index] = arena.i["level"][index]
     if strict:
         f["damped"][: 1 << len(settings.stack)] = _damped(robot, settings)
+    pairs, known = pair_memory(robot.n, 0, 0, 0, 0, 0)[0], NOTHING
+    if settings.limits.avoidance.on:
+        distances, known = Distances(robot, settings.limits.avoidance), observed
+        distances.observe(known)
+        pairs = distances.arguments
+    _write_guard(f, robot, settings)
     tasks = [_write_reference(arena, f, span, references) for span in spans]
     levels = [
         {"name": level.name, "index": index, "rows": level.rows.stop - level.rows.start}
@@ -145,8 +161,13 @@ def image_of(
         "layout": layout_number(),
         "tasks": tasks,
         "levels": levels,
+        "objects": [shape.name for shape in known.shapes],
     }
-    memory, offsets = _joined(arena, loop, loop_where, robot.n, sha256(json.dumps(named).encode()).digest())
+    memory, offsets = _joined(
+        (*arena.arguments, loop, loop_where, *pairs),
+        robot.n,
+        sha256(json.dumps(named).encode()).digest(),
+    )
     digest = digest_of(memory)
     memory = memory[: 8 * DIGEST] + digest.to_bytes(8, "little") + memory[8 * DIGEST + 8 :]
     made = {"bytes": len(memory), "digest": f"{digest:016x}"}
@@ -231,11 +252,17 @@ def _write_reference(
     return entry | {"target": "fixed"}
 
 
-def _joined(
-    arena: Arena, loop: Array, loop_where: Array, n: int, names: bytes
-) -> tuple[bytes, dict[str, int]]:
+def _write_guard(f: dict[str, Array], robot: Robot, settings: Settings) -> None:
+    """Writes which guard lowers velocity limits, see `himpc.controllers.stall_guard.guard_of`."""
+    limits = settings.limits
+    kind = STALL if limits.avoidance.on else PRESSING if limits.stall_guard else UNGUARDED
+    f["setup"][[GUARD, MARGIN]] = kind, limits.avoidance.velocity_margin
+    f["setup"][LARGEST_ERROR] = limits.avoidance.pull or np.inf
+    f["carried"][:], f["v_limit"][:] = carried(robot), robot.v_limit
+
+
+def _joined(arrays: Sequence[Any], n: int, names: bytes) -> tuple[bytes, dict[str, int]]:
     """Returns the words that describe where the arrays begin, followed by all arrays."""
-    arrays = (*arena.arguments, loop, loop_where)
     words, offsets, end = np.zeros(WORDS, np.int64), {}, 8 * WORDS
     pieces = []
     for index, (name, array) in enumerate(zip(ARRAYS, arrays, strict=True)):

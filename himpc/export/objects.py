@@ -57,8 +57,9 @@ _MEMORY = frozenset({"memcpy", "memset", "memmove"})
 _COUNTS = re.compile(r"^define [^\n]*@(NRT_incref|NRT_decref)\(.*?^\}\n", re.MULTILINE | re.DOTALL)
 
 
-_STRUCTURES = re.compile(r"= alloca (?!i\d+,|ptr,|double,)|getelementptr [\w ]*[{%]")
-"""Matches local variables that are not numbers, and addresses inside a structure."""
+_STRUCTURES = re.compile(r"(?:= alloca |getelementptr [\w ]*)(?:\[\d+ x )?(?:%|\{[^}\n]*ptr)")
+"""Matches local variables that are structures with pointers, and addresses inside such a structure. A
+structure of numbers is the same for all targets, whose integers of 64 bits all begin at multiples of 8."""
 
 
 def target_named(name: str) -> Target:

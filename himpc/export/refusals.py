@@ -9,6 +9,7 @@ from himpc.controllers.nhimpc import NHIMPC
 from himpc.controllers.weighted import Weighted
 from himpc.formulation.settings import Settings
 from himpc.limits.constraints import imposed
+from himpc.limits.distance import DISTANCE
 from himpc.tick.configure import is_built_in
 from himpc.tick.tables import python_constraints
 from robots import InputError
@@ -25,9 +26,7 @@ def check(controller: Controller, settings: Settings) -> None:
         raise InputError(
             "M_bar_adapt needs the robot's dynamic model, which is not exported: set it to false"
         )
-    if settings.limits.stall_guard:
-        raise InputError("the guard of a blocked robot is not exported: set limits.stall_guard to false")
-    constraints = python_constraints(imposed(settings.limits))
+    constraints = [each for each in python_constraints(imposed(settings.limits)) if each is not DISTANCE]
     if constraints:
         raise InputError(
             f"the limit '{constraints[0].label}' is computed in Python, which is not exported: switch it off"

@@ -55,6 +55,7 @@ class CollisionModel:
     def __init__(self, robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: bool = False) -> None:
         self._tree = geometry(robot)
         self._around = surroundings(robot, obstacles, self_collision)
+        self._meets = self._around.meets.astype(np.intp)
 
     @property
     def links(self) -> tuple[str, ...]:
@@ -87,7 +88,7 @@ class CollisionModel:
         count = near(
             *(*where, *tree.of_joints[1:], tree.carries, around.joint, around.centre, around.span),
             *(around.radius, around.kind, around.carrier, around.turn, around.middle, around.half),
-            *(around.thickness, around.meets, within, np.empty((K, S, 3)), np.empty((K, S, 3))),
+            *(around.thickness, self._meets, within, np.empty((K, S, 3)), np.empty((K, S, 3))),
             *(knot, sphere, shape, np.empty(most + 1), distance, normal, gradient),
         )
         columns = (knot[:count], distance[:count], gradient[:count], sphere[:count], shape[:count])

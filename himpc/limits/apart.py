@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 _ITERATIONS = 100
 """Largest number of iterations of the QP, which has one unknown for each joint and each direction."""
-_FAINT = 1e-5
+FAINT = 1e-5
 """Weight of the change of torque in the cost of the QP."""
 
 
@@ -52,7 +52,7 @@ def kept_apart(rows: Rows, joints: int, U: Array) -> Array:
     bounded = np.isfinite(lower) | np.isfinite(upper)
     normals, lower, upper = normals[bounded], lower[bounded], upper[bounded]
     c = len(normals)
-    H = np.diag(np.r_[np.full(n, _FAINT), np.ones(c)])
+    H = np.diag(np.r_[np.full(n, FAINT), np.ones(c)])
     A = np.block([[np.eye(n), np.zeros((n, c))], [normals, np.eye(c)]])
     solution = solve_qp(H, np.zeros(n + c), A, np.r_[least, lower], np.r_[most, upper], "daqp", _ITERATIONS)
     moved = U.copy()

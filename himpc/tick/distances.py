@@ -14,17 +14,17 @@ from himpc.kinematics.geometry import Geometry, geometry
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import row_count
 from himpc.limits.near import Near
-from himpc.references.observed import Observed
-from himpc.tick.kernel.arena import Arena
+from himpc.references.observed import NOTHING, Observed
+from himpc.tick.kernel.arena import Arena, laid_out
 from himpc.tick.kernel.distance_rows import (
     CHANGED,
     FASTEST,
     ROOM,
+    chosen_pairs,
     distance_rows,
-    nearest,
+    near_pairs,
 )
-from himpc.tick.kernel.near import near
-from himpc.tick.kernel.placements import place_all
+from himpc.tick.kernel.pair_arrays import PAIR_NUMBERS, PAIR_WHOLES, pair_sizes
 from robots import Robot
 from robots.collision import Surroundings
 from robots.cover_shapes import WorldShape, cover_surroundings, placements
@@ -43,42 +43,44 @@ _NEVER = 0.03
 """m: two links with at most two joints between them need no row if they are farther apart in all postures."""
 
 
-_STILL = np.zeros((0, 3))
-"""The velocities of objects that are at rest."""
+PairMemory = tuple[Array, Indices, Indices, Indices]
+"""The four arrays of the pairs that compiled functions receive."""
+
+
+def pair_memory(*numbers: int) -> tuple[PairMemory, dict[str, Array], dict[str, Indices]]:
+    """Returns the arrays that compiled functions receive, and the arrays of `PairArrays` by name. numbers:
+    n, J, S, O, P and R."""
+    sizes = pair_sizes(np.array(numbers))._asdict()
+    data, where, f = laid_out(PAIR_NUMBERS, sizes, np.float64)
+    whole, whole_where, i = laid_out(PAIR_WHOLES, sizes, np.intp)
+    i["counts"][:] = numbers
+    return (data, where, whole, whole_where), f, i
 
 
 class _Pairs:
-    """The near pairs of capsules and shapes. The arrays have space for all pairs of the surroundings.
+    """The arrays of the pairs of capsules and shapes, see `PairArrays`. They have space for all pairs of the
+    surroundings.
 
     Attributes:
-        count: number of pairs.
-        sphere, shape: (count,) or more, indices of the capsule and of the shape of each pair. distance: m.
-            normal: (·, 3). slopes: (·, n).
+        around: the surroundings.
+        f, i: the arrays by name. arguments: the four arrays that compiled functions receive.
     """
 
-    def __init__(self, tree: Geometry, around: Surroundings) -> None:
-        self._tree, self.around = tree, around
-        S, most = len(around.radius), int(around.meets.sum()) + 1
-        self._joints = *tree.of_joints, tree.rotation, tree.translation, tree.axis
-        self._q = np.empty((1, tree.moves.shape[1]))
-        self._placed = np.empty((1, len(tree.parent), 12)), np.empty((1, len(tree.parent), 3))
-        self._scratch = np.empty((1, S, 3)), np.empty((1, S, 3))
-        self._knot, self.sphere, self.shape = np.zeros((3, most), np.intp)
-        self._share, self.distance = np.empty(most), np.empty(most)
-        self.normal, self.slopes = np.empty((most, 3)), np.empty((most, tree.moves.shape[1]))
-        self.count = 0
+    def __init__(self, tree: Geometry, around: Surroundings, rows: int = 0) -> None:
+        (J, n), (O, S) = tree.moves.shape, around.meets.shape
+        self.around = around
+        self.arguments, self.f, self.i = pair_memory(n, J, S, O, int(around.meets.sum()) + 1, rows)
+        for name, table in (tree._asdict() | around._asdict()).items():
+            if name in self.f or name in self.i:
+                (self.f if name in self.f else self.i)[name][:] = table
+        self.i["link"][:], self.i["other"][:], self.f["share"][:] = -1, -1, 1.0
+        self.f["about"][ROOM] = math.inf
 
-    def find(self, q: Array, within: float) -> None:
-        """Finds the pairs nearer than `within`, m, at the positions q, (n,)."""
-        around, tree = self.around, self._tree
-        self._q[0] = q
-        place_all(*self._joints, self._q, *self._placed)
-        self.count = near(
-            *(*self._placed, *tree.of_joints[1:], tree.carries, around.joint, around.centre, around.span),
-            *(around.radius, around.kind, around.carrier, around.turn, around.middle, around.half),
-            *(around.thickness, around.meets, within, *self._scratch),
-            *(self._knot, self.sphere, self.shape, self._share, self.distance, self.normal, self.slopes),
-        )
+    def find(self, q: Array, within: float) -> tuple[Indices, Indices, Array]:
+        """Returns shape, capsule and distance, m, of the pairs nearer than `within`, m, at the positions q,
+        (n,)."""
+        count = near_pairs(*self.arguments, q, within)
+        return self.i["shape"][:count], self.i["sphere"][:count], self.f["distance"][:count]
 
 
 class _Links(NamedTuple):
@@ -109,19 +111,17 @@ def _links(robot: Robot) -> _Links:
         search, close, q = _Pairs(tree, around._replace(meets=only)), np.zeros_like(meets), robot.home.copy()
         for values in product(*(np.linspace(low[j], high[j], _GRID) for j in joints)):
             q[list(joints)] = values
-            search.find(q, _NEVER)
-            close[search.shape[: search.count], search.sphere[: search.count]] = True
+            close[search.find(q, _NEVER)[:2]] = True
         meets &= ~only | close
     kept, search = np.full(meets.shape, np.inf), _Pairs(tree, around._replace(meets=meets))
-    search.find(robot.home, WITHIN)
-    at = search.shape[: search.count], search.sphere[: search.count]
-    kept[at] = _AT_HOME * np.maximum(search.distance[: search.count], 0.0)
+    *at, distance = search.find(robot.home, WITHIN)
+    kept[tuple(at)] = _AT_HOME * np.maximum(distance, 0.0)
     return _Links(meets, kept)
 
 
-def carried(robot: Robot) -> NDArray[np.bool_]:
-    """Returns whether the motor of joint j carries joint k, (n, n), entry [k, j]; true for k = j."""
-    return np.ascontiguousarray(geometry(robot).moves[list(robot.joints)] > 0)
+def carried(robot: Robot) -> Array:
+    """Returns whether the motor of joint j carries joint k, (n, n), entry [k, j]; 1 for k = j."""
+    return np.ascontiguousarray(geometry(robot).moves[list(robot.joints)])
 
 
 class Distances:
@@ -134,80 +134,81 @@ class Distances:
     """
 
     def __init__(self, robot: Robot, avoidance: Avoidance) -> None:
-        self._robot, self._avoidance = robot, avoidance
-        self._chosen = np.zeros(row_count(robot.n), np.intp)
-        self._links, self._others = np.full((2, len(self._chosen)), -1)
-        self._moving, self._share = np.zeros(len(self._chosen)), np.ones(len(self._chosen))
-        self._about, self._named = np.array([math.inf, 0.0, 0.0]), ("",) * robot.n
-        self._numbers = np.array(
-            (avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration)
-        )
+        self._robot, self._avoidance, self._named = robot, avoidance, ("",) * robot.n
         # A joint without a limit gets the largest limit of the other joints.
         limited = np.isfinite(robot.v_limit)
         self._fastest = np.where(limited, robot.v_limit, robot.v_limit[limited].max(initial=1.0))
         self.carried = carried(robot)
         self.velocity_margin = avoidance.velocity_margin
-        self._observed: Observed | None = None
+        self._observed = NOTHING
+        self._pairs: _Pairs | None = None
+
+    @property
+    def arguments(self) -> PairMemory:
+        """The arrays of the pairs that compiled functions receive."""
+        return self._known.arguments
+
+    @property
+    def _known(self) -> _Pairs:
+        if self._pairs is None:
+            self.observe(NOTHING)
+        assert self._pairs is not None
+        return self._pairs
 
     @property
     def room(self) -> float:
         """The smallest difference, m, between the distance of a pair at the last tick and the distance that
         the pair must keep. Infinite if no pair was within `WITHIN`."""
-        return float(self._about[ROOM])
+        return math.inf if self._pairs is None else float(self._pairs.f["about"][ROOM])
 
     @property
     def moves(self) -> bool:
         """Whether an object with a row moves."""
-        return bool(self._about[FASTEST] > PROGRESS)
+        return self._pairs is not None and bool(self._pairs.f["about"][FASTEST] > PROGRESS)
 
     def observe(self, observed: Observed) -> None:
-        """Stores the present placements of the objects."""
-        before, self._observed = self._observed, observed
-        if before is None or before.shapes != observed.shapes:
-            if before and list(map(_kind, observed.shapes)) == list(map(_kind, before.shapes)):
-                around, B = self._pairs.around, len(observed.shapes)
-                around.turn[:B], around.middle[:B] = placements(observed.shapes)
+        """Stores the present placements and velocities of the objects."""
+        before, self._observed, B = self._observed, observed, len(observed.shapes)
+        pairs = self._pairs
+        if pairs is None or before.shapes != observed.shapes:
+            if pairs is not None and list(map(_kind, observed.shapes)) == list(map(_kind, before.shapes)):
+                pairs.f["turn"][:B], pairs.f["middle"][:B] = placements(observed.shapes)
             else:
-                self._know(observed)
+                pairs = self._pairs = self._know(observed)
+        pairs.f["velocity"][:B] = 0.0 if observed.velocity is None else observed.velocity
 
-    def _know(self, observed: Observed) -> None:
+    def _know(self, observed: Observed) -> _Pairs:
         """Prepares the arrays for a new set of objects."""
-        around = cover_surroundings(self._robot, cover_of(self._robot), observed.shapes)
-        links, B = _links(self._robot), len(observed.shapes)
+        robot, avoidance = self._robot, self._avoidance
+        around = cover_surroundings(robot, cover_of(robot), observed.shapes)
+        links, B = _links(robot), len(observed.shapes)
         around.meets[B:] = links.meets
-        kept = self._avoidance.d_safe + self._avoidance.margin
-        self._shares = np.ones(around.meets.shape)
+        pairs, kept = _Pairs(geometry(robot), around, row_count(robot.n)), avoidance.d_safe + avoidance.margin
+        pairs.f["shares"][:] = 1.0
         if kept > 0.0:
-            self._shares[B:] = np.minimum(1.0, links.kept / kept)
-        self._pairs = _Pairs(geometry(self._robot), around)
-        self._times = np.empty(len(self._pairs.distance))
-        self._links[:], self._named = -1, ("",) * self._robot.n
+            pairs.f["shares"][B:] = np.minimum(1.0, links.kept / kept)
+        pairs.f["fastest"][:] = self._fastest
+        pairs.f["numbers"][:] = avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration
+        self._named = ("",) * robot.n
         self._names = [[f"{link} – {name}" for link in around.links] for name in around.names]
+        return pairs
 
-    def _find(self, q: Array) -> int:
-        """Chooses the nearest pairs at the positions q; returns their number."""
-        assert self._observed is not None
-        pairs, velocity = self._pairs, self._observed.velocity
-        pairs.find(q, WITHIN)
-        count = nearest(
-            *(pairs.count, pairs.distance, pairs.sphere, pairs.shape, pairs.normal, pairs.slopes),
-            *(self._shares, _STILL if velocity is None else velocity, self._fastest),
-            *(self._avoidance.d_safe, self._times, self._chosen),
-            *(self._links, self._others, self._share, self._moving, self._about),
-        )
-        if self._about[CHANGED]:
-            at = zip(self._others[:count].tolist(), self._links[:count].tolist(), strict=True)
-            names = [self._names[other][link] for other, link in at]
-            self._named = (*names, *[""] * (self._robot.n - count))
-        return count
+    def _name(self) -> tuple[str, ...]:
+        """Returns the name of the pair of each row, (n,); empty where there is none."""
+        f, i = self._known.f, self._known.i
+        if f["about"][CHANGED]:
+            at = zip(i["other"].tolist(), i["link"].tolist(), strict=True)
+            names = [self._names[other][link] for other, link in at if other >= 0]
+            self._named = (*names, *[""] * (self._robot.n - len(names)))
+        return self._named
 
     def at(self, q: Array, observed: Observed) -> Near:
         """Returns the nearest pairs at the positions q, (n,)."""
         self.observe(observed)
-        count = self._find(q)
-        pairs, chosen = self._pairs, self._chosen[:count]
-        moving, share = self._moving[:count].copy(), self._share[:count].copy()
-        return Near(pairs.distance[chosen], pairs.slopes[chosen], moving, share, self._named[:count])
+        count = chosen_pairs(*self.arguments, q)
+        f, chosen = self._known.f, self._known.i["chosen"][:count]
+        moving, share = f["moving"][:count].copy(), f["share"][:count].copy()
+        return Near(f["distance"][chosen], f["slopes"][chosen], moving, share, self._name()[:count])
 
     def write(self, arena: Arena, block: int) -> tuple[str, ...]:
         """Writes the rows of this tick to an arena that holds the measured state; returns the name of each
@@ -215,13 +216,8 @@ class Distances:
 
         block: index of the set of directions for distances.
         """
-        pairs = self._pairs
-        count = self._find(arena.f["q"])
-        distance_rows(
-            *(*arena.arguments, block, count, self._chosen, pairs.distance, pairs.slopes),
-            *(self._moving, self._share, self._numbers),
-        )
-        return self._named
+        distance_rows(*arena.arguments, *self.arguments, block)
+        return self._name()
 
 
 class Anywhere(NamedTuple):
@@ -231,7 +227,7 @@ class Anywhere(NamedTuple):
         carried, velocity_margin, room, moves: as for `Distances`.
     """
 
-    carried: NDArray[np.bool_]
+    carried: Array
     velocity_margin: float
     room: float = 0.0
     moves: bool = False

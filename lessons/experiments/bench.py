@@ -11,7 +11,7 @@ import numpy as np
 from himpc.qp import Solver, is_installed
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import as_torque_scene
-from lessons.scenes.run_spec import RunSpec
+from lessons.scenes.run_spec import AS_PRINTED, RunSpec
 from lessons.session.torque import TorqueSession
 
 HORIZONS = (5, 10, 20, 30)
@@ -63,7 +63,7 @@ def bench(
         ticks: timed ticks per contender.
         progress: called with the completed share.
     """
-    loaded = as_torque_scene(RunSpec(scene).for_export().prepared(), "bench's")
+    loaded = as_torque_scene(RunSpec(scene).but(*AS_PRINTED).prepared(), "bench's")
     timings = []
     for index, N in enumerate(horizons):
         sessions = {}

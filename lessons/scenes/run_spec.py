@@ -8,15 +8,14 @@ import shlex
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
 
-from lessons.scenes.names import VELOCITY_SCENES
 from robots.errors import InputError
 
 if TYPE_CHECKING:
     from lessons.events import Event
     from lessons.scenes.scene import Scene
 
-NOT_EXPORTED = ("avoidance.on=false", "limits.stall_guard=false")
-"""The assignments that switch off what scenes have by default and exported controllers lack."""
+AS_PRINTED = ("avoidance.on=false", "limits.stall_guard=false")
+"""The assignments that switch off what scenes have by default and the papers do not print."""
 
 MAX_SEED = 2**63 - 1
 _TASK_FILE = re.compile(r'"task"\s*:\s*("(?:[^"\\]|\\.)*\.py")')
@@ -84,11 +83,6 @@ class RunSpec:
     def but(self, *assignments: str) -> RunSpec:
         """Returns the same run with further assignments."""
         return replace(self, set=(*self.set, *assignments))
-
-    def for_export(self) -> RunSpec:
-        """Returns the run as an exported controller can repeat it: without distances and without the guard
-        of a blocked robot, which are not exported. Assignments of the run itself remain in force."""
-        return self if self.scene in VELOCITY_SCENES else replace(self, set=(*NOT_EXPORTED, *self.set))
 
     def admitting(self, *assignments: str) -> RunSpec:
         """Returns the same run with further assignments by the person who started the program: the Python

@@ -15,7 +15,7 @@ from app.view.robot import CoverView
 from app.view.world import ContactView, WorldView
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveTarget
-from lessons.scenes.run_spec import RunSpec
+from lessons.scenes.run_spec import AS_PRINTED, RunSpec
 from robots import Ball, Box, Floor, load_robot
 from robots.covering.cover_of import cover_of
 from robots.shapes.capsules import cover_parts
@@ -26,7 +26,7 @@ from robots.world import Thing
 def test_the_simulation_reports_what_the_robot_touches() -> None:
     """A hand is dragged into the floor; the status reports the contact, with a force that pushes the hand
     upwards."""
-    body = SimulationRunner(SceneChoice(RunSpec("panda-hold").for_export()))
+    body = SimulationRunner(SceneChoice(RunSpec("panda-hold").but(*AS_PRINTED)))
     try:
         assert [thing.shape.name for thing in body.ready().world] == ["floor"]
         assert body.status().contacts == ()

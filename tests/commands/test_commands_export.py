@@ -19,10 +19,13 @@ from himpc.limits.braking import least_slack, missed
 from himpc.limits.limits import LimitsInForce
 from himpc.limits.rows import build_rows
 from himpc.prediction.joint import JointState
-from himpc.references import previews
+from himpc.references.outlook import Outlook
+from himpc.tick.distances import Distances
 from himpc.tick.kernel import control_period
+from lessons.events import MoveTarget
 from lessons.scenes.catalog import as_torque_scene, torque_scene
 from lessons.scenes.run_spec import RunSpec
+from lessons.session.observed import objects_of
 from lessons.session.torque import TorqueSession
 from tests.commands.exported import controller_in, exported, needed, replayed, rows_of, told
 
@@ -31,8 +34,9 @@ pytestmark = pytest.mark.nightly(
     *(f"lessons/{part}" for part in ("events", "recording", "runs", "scenes", "session", "settings")),
 )
 """Compiling a controller for export takes a minute of a core."""
-SCENES = ("planar3-conflict", "iiwa14-circle", "iiwa14-hold")
+SCENES = ("planar3-conflict", "iiwa14-circle", "iiwa14-hold", "iiwa14-table")
 M_BAR, GAINS, Q, R, LIMITS, ENABLED, ORDER = range(1, 8)
+OBJECT = 10
 BRAKE, HOLD = 5, 6
 
 
@@ -96,6 +100,8 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
     one.view("setup")[5] = 0.0  # BUDGET
     random = np.random.default_rng(7)
     seen, met, hard, v_was = set(), 0, 0, np.zeros(7)
+    distances = Distances(scene.robot, settings.limits.avoidance)
+    around = objects_of(TorqueSession(scene).plant)
     one.tick(scene.q_0, v_was)
     for _ in range(200):
         q = scene.q_0 + 0.3 * random.normal(size=7)
@@ -107,7 +113,8 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
         bounds = LimitsInForce(now[0], now[1], now[2], now[6], now[7], now[5])
         state, v_was = JointState(q, v, (v - v_was) / settings.T_s), v
         rows = build_rows(
-            state, applied, np.array(settings.M_bar), settings.limits, bounds, settings.horizon, settings.T_s
+            *(state, applied, np.array(settings.M_bar), settings.limits, bounds, settings.horizon),
+            *(settings.T_s, distances.at(q, around)),
         )
         if least_slack(rows).any():
             continue
@@ -125,10 +132,11 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
 def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
     """M̄, gains, weights, limits and the order of the levels are changed, and levels are switched off and on.
     The torques stay those of a Python controller with the same settings."""
-    scene = as_torque_scene(RunSpec("iiwa14-hold").for_export().prepared(), "the test")
+    scene = as_torque_scene(RunSpec("iiwa14-hold").prepared(), "the test")
     settings = scene.settings.for_controller()
     python, one = HIMPC(scene.robot, settings), controller_in(folders["iiwa14-hold"])
-    references = TorqueSession(scene).references
+    session = TorqueSession(scene)
+    references, around = session.references, objects_of(session.plant)
     low, high = settings.stack[0], settings.stack[1:]
     limits = in_force(scene.robot, settings.limits)
     M_bar = tuple(1.2 * each for each in settings.M_bar)
@@ -163,7 +171,7 @@ def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
         if k in steps:
             python.configure(steps[k][0])
             assert [one.set(*each) for each in steps[k][1]] == [0] * len(steps[k][1])
-        ahead = previews(references, k * settings.T_s, settings.T_s, settings.horizon)
+        ahead = Outlook(references, k * settings.T_s, settings.T_s, settings.horizon, around)
         wanted = python.step(q, v, ahead, applied).tau
         tau, fallback = one.tick(q, v, applied)
         assert fallback == 0
@@ -291,3 +299,35 @@ def test_a_loop_in_c_with_mujoco_moves_as_python_does(folders: dict[str, Path]) 
     assert int(answer[0]) == 1000
     assert float(answer[answer.index("Python") + 1]) < 1e-6
     assert answer[-4] == "0"
+
+
+def test_an_exported_controller_keeps_distances(folders: dict[str, Path]) -> None:
+    """A target is dragged into the table. In closed loop with the simulated robot, the exported controller
+    gives the torques of Python to 1 mN·m (up to 18 of 35 rows are active, and rounding counts there), no link
+    touches anything, and the arm comes nearly to rest. Told that the ball is at the hand, it moves away."""
+    scene = as_torque_scene(RunSpec("iiwa14-table").prepared(), "the test")
+    session, one = TorqueSession(replace(scene, events=())), controller_in(folders["iiwa14-table"])
+    one.reset(session.plant.tau)
+    target = session.target("position")
+    assert target is not None
+    below = (*target.raw[:2].tolist(), -0.2)
+    session.post(MoveTarget("position", below))
+    assert one.set(0, 0, below) == 0
+
+    def step() -> float:
+        applied = session.plant.tau.copy()
+        session.tick()
+        given, plan = session.controller_input, session.plan
+        assert given is not None and plan is not None
+        return float(np.abs(one.tick(given.q, given.v, applied)[0] - plan.tau).max())
+
+    for _ in range(3000):
+        assert step() < 1e-3
+        assert not session.plant.contacts
+    assert np.abs(session.plant.v).max() < 0.03
+    ball = one.manifest["objects"].index("ball")
+    hand = one.view("value")[:3]
+    assert one.set(OBJECT, ball, [*hand, 0.0, 0.0, 0.0, 0.0]) == 0
+    assert step() > 0.05
+    assert one.set(OBJECT, len(one.manifest["objects"]), [0.0] * 7) == -2
+    assert one.set(OBJECT, ball, [float("nan"), *[0.0] * 6]) == -3

@@ -18,7 +18,7 @@ from himpc.tick.kernel.arrays import TickArrays
 from himpc.tick.tables import sizes
 
 FOLDER = Path(next(iter(himpc.tick.__path__)))
-TABLE = ("arrays", "arena")
+TABLE = ("arrays", "arena", "pair_arrays")
 FILES = [(path.stem, path.read_text()) for path in FOLDER.rglob("*.py") if path.stem not in TABLE]
 HINTS = get_type_hints(TickArrays, include_extras=True)
 

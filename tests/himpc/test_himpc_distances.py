@@ -23,7 +23,6 @@ from himpc.limits import Limits, in_force
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import least_rates
 from himpc.limits.near import Near
-from himpc.limits.windup import taken_back
 from himpc.references.observed import Observed
 from himpc.tick.distances import Distances
 from robots import Robot, load_robot
@@ -271,19 +270,3 @@ def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
         share = now.stall([error], False, 0.01)
     # an error that decreases while the robot brakes does not make it faster again
     assert share == stalled
-
-
-def test_an_arm_that_loses_its_contact_gains_the_speed_that_the_guard_assumes() -> None:
-    """The torque that held the contact accelerates the arm until time-delay estimation has taken it back.
-    From half of `taken_back` in every joint, the arm gains half of its velocity limits, whatever its inertia
-    is."""
-    rng, T_s = np.random.default_rng(3), 1e-3
-    root = rng.normal(size=(4, 4))
-    M = root @ root.T + np.eye(4)
-    M_bar = 0.3 * np.linalg.eigvalsh(M)[0] * rng.uniform(0.5, 1.0, 4)
-    v_limit = rng.uniform(1.0, 3.0, 4)
-    tau, v = 0.5 * taken_back(M_bar, v_limit, T_s), np.zeros(4)
-    for _ in range(20_000):
-        a = np.linalg.solve(M, tau)
-        v, tau = v + T_s * a, tau - M_bar * a
-    assert v == pytest.approx(0.5 * v_limit, rel=1e-6)

@@ -16,8 +16,8 @@ from himpc.limits import POSITION, TORQUE, VELOCITY, Limits, LimitsInForce, buil
 from himpc.limits.braking import least_slack
 from himpc.limits.limits import POSITION_MARGIN
 from himpc.limits.viability import RETURN_RATE, viability_bounds
-from himpc.limits.windup import taken_back
 from himpc.prediction.joint import JointState
+from himpc.tick.kernel.windup import taken_back
 from robots import InputError, load_robot
 
 Array = NDArray[np.float64]

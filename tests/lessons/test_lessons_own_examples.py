@@ -12,7 +12,7 @@ from himpc import printed
 from lessons.events import MoveTarget, Push
 from lessons.recording.run import run
 from lessons.scenes.catalog import load_scene, prepared, torque_scene
-from lessons.scenes.run_spec import NOT_EXPORTED
+from lessons.scenes.run_spec import AS_PRINTED
 from lessons.session.controllers import controller_of
 from lessons.session.torque import TorqueSession
 
@@ -50,7 +50,7 @@ def beside(session: TorqueSession, name: str, ticks: int) -> float:
 )
 def test_own_himpc_on_one_page_agrees_with_the_lab(scene: str, ticks: int) -> None:
     """The example agrees also with active bounds, a target that jumps and a push."""
-    session = TorqueSession(prepared(torque_scene(scene), None, NOT_EXPORTED))
+    session = TorqueSession(prepared(torque_scene(scene), None, AS_PRINTED))
     if scene == "iiwa14-hold":
         position = session.references["position"].preview(0.0, 1e-3, 1).value
         session.post(MoveTarget("position", tuple(position + np.array([0.2, -0.2, -0.1]))))

@@ -25,7 +25,7 @@ from himpc.tasks import (
 from himpc.tasks.frame import FrameTask
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import as_torque_scene, torque_scene
-from lessons.scenes.run_spec import RunSpec
+from lessons.scenes.run_spec import AS_PRINTED, RunSpec
 from lessons.session.torque import TorqueSession
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def test_torques_with_any_kind_are_printed(kind: str, place: int, controller: st
 
     Orientations on one or two axes are computed by the kernel itself; their targets start 100° away, mostly
     about a free axis."""
-    scene = as_torque_scene(RunSpec("iiwa14-hold").for_export().prepared(), "it")
+    scene = as_torque_scene(RunSpec("iiwa14-hold").but(*AS_PRINTED).prepared(), "it")
     levels = list(scene.settings.levels)
     levels.insert(place, Level((GIVEN[kind](),)))
     taken = replace(scene.settings, stack=tuple(levels), controller=controller)

@@ -34,6 +34,8 @@ export interface SceneData {
   levels: LevelData[]; tasks: TaskData[];
   limits: { torque: boolean; velocity: boolean; position: string; torque_scale: number; velocity_scale: number };
   plant: PlantSettings; events: SceneEvent[]; model: string; poses: number[]; objects: Thing[];
+  /** Objects that can move: index of the controller, and height of the point that it knows above the middle. */
+  free: { index: number; above: number }[];
   /** The controllers by their N; the fields of a row with the controller's arrays; the HTML of the controls. */
   images: Record<string, { memory: Piece; manifest: Manifest }>; fields: Field[]; controls: string;
 }

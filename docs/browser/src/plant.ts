@@ -154,6 +154,12 @@ export class Plant {
     return this.scene.plant.contacts ? this.placed(objects.map(({ body }) => body)) : Float32Array.from(objects.flatMap(({ pose }) => pose));
   }
 
+  /** Returns position, quaternion w x y z and velocity of each free object; they exist only with contacts. */
+  free(): number[][] {
+    const n = this.n, q = this.data.qpos as Vector, v = this.data.qvel as Vector, count = (v.length - n) / 6;
+    return Array.from({ length: count }, (_, k) => [...q.subarray(n + 7 * k, n + 7 * k + 7), ...v.subarray(n + 6 * k, n + 6 * k + 3)]);
+  }
+
   private placed(bodies: string[]): Float32Array {
     return Float32Array.from(bodies.flatMap((name) => {
       using body = this.data.body(name);
@@ -162,10 +168,7 @@ export class Plant {
     }));
   }
 
-  delete(): void {
-    this.data.delete();
-    this.model.delete();
-  }
+  delete(): void { this.data.delete(); this.model.delete(); }
 }
 
 /** Rounds to the nearest whole number, and halves to the nearest even number, as NumPy does. */

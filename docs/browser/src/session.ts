@@ -1,6 +1,6 @@
 /** One run with its references, controller, plant, script and settings, as in lessons/session/torque.py. */
 import type { MainModule } from "@mujoco/mujoco";
-import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, ORDER, Q, R, TARGET, type Manifest, type kernel } from "../../../himpc/export/files/himpc.mjs";
+import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, OBJECT, ORDER, Q, R, TARGET, type Manifest, type kernel } from "../../../himpc/export/files/himpc.mjs";
 import { each, limit, pieceOf, type Pack, type RobotData, type SceneData, type SceneEvent, type Scenes } from "./data";
 import { Plant } from "./plant";
 import { Rows } from "./rows";
@@ -60,11 +60,9 @@ export class Session {
     this.controller.view("raw").set(this.begun);
     this.controller.reset(this.plant.tau);
     this.script = [...this.scene.events];
-    this.pushUntil = Infinity;
     this.ticks = this.fallback = 0;
     this.held = this.waiting = null;
-    this.truth = [NaN, NaN];
-    this.lost = false;
+    [this.pushUntil, this.truth, this.lost] = [Infinity, [NaN, NaN], false];
     this.rows.clear();
   }
 
@@ -77,6 +75,9 @@ export class Session {
     }
     const { plant, scene, rows, controller } = this;
     const q = plant.q, v = plant.v, [q_measured, v_measured] = plant.measure(), before = plant.tau;
+    // Objects that move, as in lessons/session/observed.py.
+    for (const [at, [x, y, z, w, , , k, ...velocity]] of (this.manifest.objects.length ? plant.free() : []).entries())
+      controller.set(OBJECT, scene.free[at].index, [x, y, z + scene.free[at].above, 2 * Math.atan2(k, w), ...velocity]);
     const [found, fallback] = controller.tick(q_measured, v_measured, before), tau = Float64Array.from(found);
     this.fallback = fallback;
     if (this.ticks++ % TRUTH_TICKS === 0) this.truth = plant.gauge(this.M_bar());
@@ -198,8 +199,9 @@ export class Session {
     this.send();
     this.controller.reset(this.plant.tau);
     const now = this.controller, path = now.view("path"), target = now.view("target"), samples = now.view("samples");
-    for (const name of ["q_was", "v_was", "limits", "scalars", "state", "raw", "target", "weight"])
+    for (const name of ["q_was", "v_was", "limits", "scalars", "state", "raw", "target", "weight", "v_ramped"])
       now.view(name).set(old.view(name));
+    now.view("state").fill(0, 3);  // the guard begins anew
     const [was, q_was, v_was, before] = ["path", "q_was", "v_was", "samples"].map((name) => old.view(name));
     for (let j = 1; j <= horizon; j++) for (let a = 0; a < n; a++) {
       const step = N > 1 ? was[N * n + a] - was[(N - 1) * n + a] : this.scene.period * v_was[a];

@@ -24,8 +24,7 @@ export type Told = { frame: Frame } | { verdict: Verdict } | { error: string };
 (Symbol as { dispose?: symbol }).dispose ??= Symbol.for("Symbol.dispose");
 const post = (told: Told | { answer: unknown } | { refusal: string }): void => (self as unknown as Worker).postMessage(told);
 
-let tools: Omit<Tools, "scenes">;
-let session: Session, ghost: Session | null = null, step: StepData | null = null;
+let tools: Omit<Tools, "scenes">, session: Session, ghost: Session | null = null, step: StepData | null = null;
 let running = false, judged = false, due = 0, last = 0, speed = 1, us = 0, curves: number[] = [], restarted = true, timer = 0;
 
 /** The functions that a page may call; each call ends before the next begins. */
@@ -68,9 +67,7 @@ const simulation = {
     session.set(path, value);
     if (ghost && !step!.ghost_set.includes(path)) ghost.set(path, value);
   },
-  target(task: string, value: number[]): void {
-    for (const each of both()) each.move(task, value);
-  },
+  target(task: string, value: number[]): void { for (const each of both()) each.move(task, value); },
   push(joint: number, force: number[], seconds: number): void {
     for (const each of both()) each.happen({ t: 0, event: "Push", joint, force, torque: [0, 0, 0], seconds });
   },
@@ -90,9 +87,7 @@ export type Simulation = typeof simulation;
 
 const both = (): Session[] => (ghost ? [session, ghost] : [session]);
 
-function pace(): void {
-  [due, last, speed] = [0, performance.now(), 1];
-}
+function pace(): void { [due, last, speed] = [0, performance.now(), 1]; }
 
 /** Performs one period and stores its values for the plots. */
 function advance(): void {
@@ -115,9 +110,8 @@ function verdict(): Verdict {
 function loop(): void {
   if (!running) return;
   const begun = performance.now(), { period } = session.scene;
-  due += (begun - last) / 1000;
+  const wanted = due += (begun - last) / 1000;
   last = begun;
-  const wanted = due;
   let count = 0;
   try {
     while (running && due > 0 && !session.lost && performance.now() - begun < BUSY_MS) {
@@ -125,8 +119,7 @@ function loop(): void {
       due -= period;
       count++;
       if (!step || judged || session.t < step.scene.duration - 1e-9) continue;
-      judged = true;
-      running = false;
+      [judged, running] = [true, false];
       post({ verdict: verdict() });
     }
   } catch (error) {

@@ -67,7 +67,7 @@ int himpc_set(himpc_controller *c, int what, int index, const double *values, in
 int himpc_check(const void *image, unsigned size, unsigned long long digest);
 
 enum { HIMPC_TARGET, HIMPC_M_BAR, HIMPC_GAINS, HIMPC_WEIGHT_Q, HIMPC_WEIGHT_R, HIMPC_LIMITS, HIMPC_ENABLED,
-       HIMPC_ORDER, HIMPC_WEIGHTS, HIMPC_BUDGET };
+       HIMPC_ORDER, HIMPC_WEIGHTS, HIMPC_BUDGET, HIMPC_OBJECT };
 
 /* Tasks: @tasks@. */
 enum { HIMPC_TASKS = @task_count@ };
@@ -166,6 +166,13 @@ static inline int himpc_set_order(himpc_controller *c, const char *const levels[
     double values[HIMPC_LEVELS];
     for (int i = 0; i < HIMPC_LEVELS; i++) values[i] = himpc_level(levels[i]);
     return himpc_set(c, HIMPC_ORDER, 0, values, HIMPC_LEVELS);
+}
+
+/* Moves an object that the controller knows, an index of the objects in controller.json: x y z (m; the centre, of a
+   post its foot, of a floor a point of its surface), the turn about the vertical (rad), and the velocity (m/s). */
+static inline int himpc_set_object(himpc_controller *c, int object, const double place[4], const double velocity[3]) {
+    double values[7] = {place[0], place[1], place[2], place[3], velocity[0], velocity[1], velocity[2]};
+    return himpc_set(c, HIMPC_OBJECT, object, values, 7);
 }
 
 /* What the last period found. After HIMPC_HOLD these are the results of an earlier period.

@@ -1,7 +1,7 @@
 // The exported controller in a browser or in Node. One module may hold many controllers.
 const { sin, cos, tan, atan2, hypot, exp, expm1, log, sqrt, pow } = Math;
 const env = { sin, cos, tan, atan2, hypot, exp, expm1, log, sqrt, pow };
-export const TARGET = 0, M_BAR = 1, GAINS = 2, Q = 3, R = 4, LIMITS = 5, ENABLED = 6, ORDER = 7, WEIGHTS = 8, BUDGET = 9;
+export const TARGET = 0, M_BAR = 1, GAINS = 2, Q = 3, R = 4, LIMITS = 5, ENABLED = 6, ORDER = 7, WEIGHTS = 8, BUDGET = 9, OBJECT = 10;
 const WRONG = ["was made for another kernel", "belongs to another controller.json", "is damaged"];
 export const FALLBACKS = ["solve", "soften", "feasible", "previous", "inherit", "brake", "hold"];
 
@@ -10,7 +10,7 @@ export const FALLBACKS = ["solve", "soften", "feasible", "previous", "inherit", 
  * @typedef {{ name: string, index: number, rows: number, target: string }} Task
  * @typedef {{ name: string, index: number, rows: number, tasks: string[] }} Level
  * @typedef {{ name: string, type: string, shape: number[], offset: number }} Listed
- * @typedef {{ joints: string[], digest: string, tasks: Task[], levels: Level[], arrays: Listed[] }} Manifest
+ * @typedef {{ joints: string[], digest: string, tasks: Task[], levels: Level[], objects: string[], arrays: Listed[] }} Manifest
  */
 
 /** Makes what creates controllers. @param {ArrayBuffer} wasm bytes of himpc.wasm */

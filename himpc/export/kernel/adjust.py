@@ -7,6 +7,7 @@ import math
 from himpc.compilation.compiled import inline_kernel
 from himpc.controllers.himpc import ENABLE_SECONDS, FAINTEST
 from himpc.export.kernel.follow import MISFIT, NO_HIERARCHY, NOT_USABLE, drag
+from himpc.export.kernel.guard import unguarded
 from himpc.export.kernel.loop_arrays import BUDGET as ALLOWED
 from himpc.export.kernel.loop_arrays import DAMPS, FADING, LEVELS, ON_ACCELERATION, SIMPLE, LoopArrays
 from himpc.limits.limits import POSITION_MARGIN
@@ -16,28 +17,44 @@ from himpc.tick.kernel.arrays import T_S, Array, TickArrays
 from himpc.tick.kernel.bounds import PAPER
 from himpc.tick.kernel.cascade import AFRESH, FIRST, LAST
 from himpc.tick.kernel.linear import copy, copy_rows, dot
+from himpc.tick.kernel.pair_arrays import PairArrays
 from himpc.tick.tables import ACCURACY
 
-TARGET, M_BAR, GAINS, WEIGHT_Q, WEIGHT_R, LIMITS, ENABLED, ORDER, WEIGHTS, BUDGET = range(10)
+TARGET, M_BAR, GAINS, WEIGHT_Q, WEIGHT_R, LIMITS, ENABLED, ORDER, WEIGHTS, BUDGET, OBJECT = range(11)
 """The kinds of settings."""
 _MODE = 9
 """Index in `sizes` of the kind of position limits."""
 
 
 @inline_kernel
-def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, count: int) -> int:
+def adjust(
+    t: TickArrays, p: LoopArrays, d: PairArrays, what: int, index: int, values: Array, count: int
+) -> int:
     """Changes a setting and returns 0. If the request is not valid, it changes nothing and returns FIXED,
     MISFIT, NOT_USABLE or NO_HIERARCHY.
 
     Args:
-        what: TARGET … BUDGET.
-        index: index of the task (TARGET, GAINS) or of the level (WEIGHT_Q, WEIGHT_R, WEIGHTS, ENABLED).
+        what: TARGET … OBJECT.
+        index: index of the task (TARGET, GAINS), of the level (WEIGHT_Q, WEIGHT_R, WEIGHTS, ENABLED) or of
+            the object (OBJECT).
         values, count: the numbers of the setting. TARGET: see `drag`. M_BAR: (n) kg·m². GAINS: K_p (m) 1/s²,
             then K_v (m) 1/s. WEIGHT_Q: (m). WEIGHT_R: (n). LIMITS: torque (n) N·m, velocity (n) rad/s, lower
             and upper position (n) rad each, see `LoopArrays.widest`. ENABLED: 0 or 1. ORDER: the indices of
             all levels (r), highest priority first; a damping level stays the last. WEIGHTS: Q (m), R (n).
-            BUDGET: the largest number of multiplications for changes of active rows in a period.
+            BUDGET: the largest number of multiplications for changes of active rows in a period. OBJECT: see
+            `move_object`.
     """
+    if what == OBJECT:
+        return move_object(d, index, values, count)
+    fault = change(t, p, what, index, values, count)
+    if fault == 0 and what != TARGET and what != BUDGET:
+        unguarded(p)
+    return fault
+
+
+@inline_kernel
+def change(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, count: int) -> int:
+    """Changes a setting other than OBJECT, see `adjust`."""
     n, r = t.q.size, int(p.setup[LEVELS])
     if not dot(values, values, count) < 1e18 and what != LIMITS:
         return NOT_USABLE
@@ -87,6 +104,25 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
     else:
         copy(values, t.M_bar if what == M_BAR else p.R[index], n)
         arrange(t, p)
+    return 0
+
+
+@inline_kernel
+def move_object(d: PairArrays, index: int, values: Array, count: int) -> int:
+    """Moves an object that the controller knows; returns 0, MISFIT or NOT_USABLE.
+
+    values: x, y and z in m (the centre, of a post its foot, of a floor a point of its surface), the turn
+        about the vertical in rad, and the velocity in m/s, (7,).
+    """
+    if index < 0 or index >= d.kind.size - d.joint.size or count != 7:
+        return MISFIT
+    if not dot(values, values, count) < 1e18:
+        return NOT_USABLE
+    cos, sin = math.cos(values[3]), math.sin(values[3])
+    turn = d.turn[index]
+    turn[0, 0], turn[0, 1], turn[1, 0], turn[1, 1] = cos, -sin, sin, cos
+    copy(values, d.middle[index], 3)
+    copy(values[4:], d.velocity[index], 3)
     return 0
 
 

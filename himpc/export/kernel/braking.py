@@ -7,11 +7,14 @@ import math
 
 from himpc.cascade.last_resort import ROOM
 from himpc.compilation.compiled import inline_kernel
+from himpc.export.kernel.apart import keep_apart
 from himpc.export.kernel.loop_arrays import LoopArrays
+from himpc.export.kernel.rows import constraints_of, joint_rows
 from himpc.limits.rows import BRAKING
 from himpc.limits.yielding import MET
 from himpc.tick.kernel.arrays import PERIOD, T_S, Array, TickArrays
-from himpc.tick.kernel.bounds import LevelBounds, constraint_values
+from himpc.tick.kernel.bounds import constraint_values
+from himpc.tick.kernel.pair_arrays import PairArrays
 
 _ROUNDING = 1e-14
 """A row is satisfied if its violation is less than this share of the sum of the magnitudes of its terms."""
@@ -24,12 +27,12 @@ def clamp(x: float, low: float, high: float) -> float:
 
 
 @inline_kernel
-def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
+def braking(t: TickArrays, p: LoopArrays, d: PairArrays, U: Array) -> None:
     """Computes increments (N, n) that always satisfy the torque rows, and also the velocity rows if this is
     possible. Of the position rows, each knot uses only the next one. The bounds are `lower` and `upper` of
-    the tick."""
+    the tick. Rows of distances are met if one step of torque suffices, see `keep_apart`."""
     N, n = U.shape
-    T_s, kinds = t.scalars[T_S], len(t.L) // N
+    T_s, kinds = t.scalars[T_S], joint_rows(t) // N
     for a in range(n):
         for j in range(N):
             p.low[j, a], p.high[j, a] = t.lower[N + j, a], t.upper[N + j, a]
@@ -58,6 +61,7 @@ def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
             step = p.w[j, a] - (p.w[j - 1, a] if j else 0.0)
             U[j, a] = step - gained
             gained = step
+    keep_apart(t, d, U)
 
 
 @inline_kernel
@@ -68,8 +72,16 @@ def missed(t: TickArrays, p: LoopArrays, U: Array) -> float:
     for j in range(N):
         for a in range(n):
             p.wanted[j, a] = abs(U[j, a])
-    constraint_values(p.wanted, bounds_of(t, p.size))
-    constraint_values(U, bounds_of(t, t.reached))
+    constraint_values(p.wanted, constraints_of(t, p.size))
+    for row in range(joint_rows(t), len(t.L)):
+        # The terms of a row of a distance are those of all joints.
+        D = t.direction[0]
+        for c in range(n):
+            p.size[row, c] = 0.0
+            for j in range(N):
+                for a in range(n):
+                    p.size[row, c] += t.L[row, j] * abs(D[c, a]) * p.wanted[j, a]
+    constraint_values(U, constraints_of(t, t.reached))
     worst = 0.0
     for row in range(len(t.L)):
         for a in range(n):
@@ -80,18 +92,11 @@ def missed(t: TickArrays, p: LoopArrays, U: Array) -> float:
 
 
 @inline_kernel
-def bounds_of(t: TickArrays, value: Array) -> LevelBounds:
-    """Returns the rows of this tick, all of which bound single joints; their values are written to
-    `value`."""
-    return LevelBounds(t.L, t.lower, t.upper, value, t.length, t.direction, len(t.L))
-
-
-@inline_kernel
-def soften(t: TickArrays, p: LoopArrays) -> bool:
-    """Widens the rows of velocity and position by the least slack that makes them feasible; returns False if
-    they are feasible."""
+def soften(t: TickArrays, p: LoopArrays, d: PairArrays) -> bool:
+    """Widens all rows but those of torque by the least slack that makes them feasible; returns False if they
+    are feasible."""
     N, n = p.trial.shape
-    braking(t, p, p.trial)
+    braking(t, p, d, p.trial)
     missed(t, p, p.trial)
     enough = MET if len(t.L) >= 3 * N else 0.0
     widened = False

@@ -1,13 +1,14 @@
-"""The fallbacks of a level without an optimum within its budget: those of `himpc.tick.fallbacks` that need no
-general QP solver."""
+"""The fallbacks of a level without an optimum within its budget: those of `himpc.tick.fallbacks`, but
+for the QP of each joint where position rows are imposed as printed."""
 
 from __future__ import annotations
 
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.export.kernel.braking import bounds_of, braking, missed, soften
+from himpc.export.kernel.braking import braking, missed, soften
 from himpc.export.kernel.loop_arrays import LoopArrays
+from himpc.export.kernel.rows import constraints_of
 from himpc.tick.fallbacks import LEAK
 from himpc.tick.kernel.arrays import Array, IntArray, TickArrays
 from himpc.tick.kernel.bounds import constraint_values
@@ -16,6 +17,7 @@ from himpc.tick.kernel.control_period import LINEARIZE, NOT_FINITE, perform_part
 from himpc.tick.kernel.evidence import cost_of
 from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
 from himpc.tick.kernel.linear import copy_rows, dot
+from himpc.tick.kernel.pair_arrays import PairArrays
 from himpc.tick.kernel.residual import add_effects, effects
 from himpc.tick.kernel.solve_level import solve_level
 
@@ -27,6 +29,7 @@ SOLVE, SOFTEN, FEASIBLE, PREVIOUS, INHERIT, BRAKE, HOLD = range(7)
 def period_with_fallbacks(
     t: TickArrays,
     p: LoopArrays,
+    d: PairArrays,
     data: Array,
     where: IntArray,
     whole: IntArray,
@@ -43,7 +46,7 @@ def period_with_fallbacks(
             return HOLD
         if reached == t.sizes[4]:
             return worst
-        fallback = apply_fallback(t, p, data, where, whole, whole_where, reached)
+        fallback = apply_fallback(t, p, d, data, where, whole, whole_where, reached)
         t.fallback[reached] = float(fallback)
         worst = max(worst, fallback)
         parts, i = parts & ~LINEARIZE, reached + 1
@@ -51,7 +54,14 @@ def period_with_fallbacks(
 
 @inline_kernel
 def apply_fallback(
-    t: TickArrays, p: LoopArrays, data: Array, where: IntArray, whole: IntArray, whole_where: IntArray, i: int
+    t: TickArrays,
+    p: LoopArrays,
+    d: PairArrays,
+    data: Array,
+    where: IntArray,
+    whole: IntArray,
+    whole_where: IntArray,
+    i: int,
 ) -> int:
     """Finds increments of level i that satisfy all rows if the rows are feasible; returns the fallback that
     was used."""
@@ -68,7 +78,7 @@ def apply_fallback(
         kept_rows(t, p, False)
         return fallback
     kept_rows(t, p, True)
-    widened = soften(t, p)
+    widened = soften(t, p, d)
     if widened and solve_level(data, where, whole, whole_where, i, 0.0):
         if i > 0:
             kept_rows(t, p, False)
@@ -79,7 +89,7 @@ def apply_fallback(
         shifted(t.U_was[i], t.U[i])
         fallback = PREVIOUS if settled(t.U[i]) and missed(t, p, t.U[i]) == 0.0 else BRAKE
     if fallback == BRAKE:
-        braking(t, p, t.U[i])
+        braking(t, p, d, t.U[i])
     copy_rows(p.trial, p.wanted)
     fallback = on_the_way(t, p, i, fallback)
     kept_rows(t, p, False)
@@ -102,7 +112,7 @@ def kept_rows(t: TickArrays, p: LoopArrays, keep: bool) -> None:
 @inline_kernel
 def contain(t: TickArrays, U: Array) -> None:
     """Widens the rows until U meets them. Lower levels then start from the feasible point U."""
-    constraint_values(U, bounds_of(t, t.reached))
+    constraint_values(U, constraints_of(t, t.reached))
     for row in range(len(t.L)):
         for a in range(U.shape[1]):
             t.lower[row, a] = min(t.lower[row, a], t.reached[row, a])
@@ -140,8 +150,8 @@ def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
     for j in range(N):
         for a in range(n):
             p.wanted[j, a] -= U[j, a]
-    constraint_values(U, bounds_of(t, t.reached))
-    constraint_values(p.wanted, bounds_of(t, p.size))
+    constraint_values(U, constraints_of(t, t.reached))
+    constraint_values(p.wanted, constraints_of(t, p.size))
     share = 1.0
     for row in range(len(t.L)):
         for a in range(n):

@@ -20,8 +20,8 @@ class LoopArrays(NamedTuple):
     `himpc.tick.kernel.target.roll`.
     """
 
-    setup: Annotated[Array, "8", "1", "constants of the export, see MOST and the names after it"]
-    state: Annotated[Array, "4", "1", "the memory, see STARTED and the names after it"]
+    setup: Annotated[Array, "10", "1", "constants of the export, see MOST and the names after it"]
+    state: Annotated[Array, "6", "1", "the memory, see STARTED and the names after it"]
     goal: Annotated[Array, "8 n", "N·m, rad/s, rad, rad/s²", "the desired limits, rows as in `limits`"]
     tau_limit: Annotated[Array, "n", "N·m", "largest torque of each joint; a larger reading is reduced to it"]
     Q: Annotated[Array, "M", "s⁴/m²", "weight of each row's residual"]
@@ -38,7 +38,22 @@ class LoopArrays(NamedTuple):
     raw: Annotated[Array, "T V", "m, rad, 1", "the raw target, which is not filtered"]
     caps: Annotated[Array, "T K", "m/s, m/s², m/s³", "speed, acceleration and jerk limits; then scratch"]
     samples: Annotated[Array, "T N1 W", "m, m/s, m/s²", "the filtered target at this and the next periods"]
+    # The guard, see `himpc.controllers.stall_guard`.
+    carried: Annotated[Array, "n n", "1", "whether the motor of joint j carries joint k, entry [k, j]"]
+    v_limit: Annotated[Array, "n", "rad/s", "velocity limits of the robot"]
+    v_ramped: Annotated[Array, "n", "rad/s", "velocity limits in force before the guard has lowered them"]
+    errors: Annotated[Array, "T", "m, rad", "length of the error of each task that is solved"]
+    due: Annotated[Array, "T", "m, rad", "the errors that the tasks should have reached by now"]
+    stall: Annotated[Array, "2", "1, m", "numbers about the stall, see STALL_SHARE"]
+    load: Annotated[Array, "n", "1", "mean load of each joint"]
+    mean: Annotated[Array, "n", "rad/s", "mean velocity of each joint"]
+    tau_before: Annotated[Array, "n", "N·m", "the torque that acted one period ago"]
+    wound: Annotated[Array, "n", "1", "change of the torque of joints that are still"]
+    windup: Annotated[Array, "2", "1", "numbers about the wind-up, see TREND"]
     # Scratch.
+    free_limit: Annotated[Array, "n", "rad/s", "velocity limits less the margin of a guarded robot"]
+    largest_torque: Annotated[Array, "n", "N·m", "the larger torque limit in force"]
+    pressing: Annotated[Array, "n", "N·m", "the largest torque with which a joint may press"]
     lowest: Annotated[Array, "b n", "N·m", "lower bounds before a fallback has widened them"]
     highest: Annotated[Array, "b n", "N·m", "upper bounds before a fallback has widened them"]
     size: Annotated[Array, "b n", "N·m", "sum of the magnitudes of each row's terms"]
@@ -63,13 +78,16 @@ SHAPES: dict[str, str] = {
 }
 """The shape of every array by name, in the order of the arrays."""
 
-MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE = range(7)
+MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE, GUARD, MARGIN, LARGEST_ERROR = range(10)
 """Indices of `setup`: largest number of iterations and their tolerance (N·m), see `NHIMPC`; whether R weighs
 M̄⁻¹Δτ; number of levels and whether the last one is the damping level; largest number of multiplications in a
-tick; whether levels form a strict hierarchy, which is required to switch levels."""
-STARTED, TICKS, FADING = range(3)
-"""Indices of `state`: whether the previous tick is stored, number of ticks since the reset, and whether rows
-fade in."""
+tick; whether levels form a strict hierarchy, which is required to switch levels; the kind of guard; share of
+the velocity limits that a guarded robot does not use; the largest error on which tasks act (m, rad)."""
+UNGUARDED, STALL, PRESSING = range(3)
+"""The kinds of guards: none, `StallGuard` and `WindupGuard`."""
+STARTED, TICKS, FADING, GUARDED, ERRORS, FASTEST = range(6)
+"""Indices of `state`: whether the previous tick is stored, number of ticks since the reset, whether rows fade
+in, whether the guard has data, number of known errors, and the largest velocity of a reference."""
 DRAGGABLE, ROWS, WIDTH, KNOWN = range(4)
 """Columns of `target`. KNOWN is 0 for a target at rest."""
 LoopSizes = namedtuple("LoopSizes", "n N N1 M r T b D V W K")

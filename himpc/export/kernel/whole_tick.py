@@ -9,6 +9,7 @@ from himpc.compilation.compiled import inline_kernel
 from himpc.export.kernel.adjust import adjust, arrange, fade, ramp, write_rows
 from himpc.export.kernel.fallbacks import HOLD, SOLVE, period_with_fallbacks
 from himpc.export.kernel.follow import follow, rest_at_targets
+from himpc.export.kernel.guard import guard, remember_errors, unguarded
 from himpc.export.kernel.loop_arrays import (
     BUDGET,
     FADING,
@@ -19,11 +20,14 @@ from himpc.export.kernel.loop_arrays import (
     LoopArrays,
     loop_arrays_of,
 )
-from himpc.tick.kernel.arrays import NOW, PERIOD, T_S, Array, IntArray, TickArrays, arrays_of
+from himpc.tick.kernel.arrays import DIRECTED, NOW, PERIOD, T_S, Array, IntArray, TickArrays, arrays_of
 from himpc.tick.kernel.cascade import finite
 from himpc.tick.kernel.control_period import ALL_PARTS, ITERATION
+from himpc.tick.kernel.distance_rows import FASTEST as OBJECT_SPEED
+from himpc.tick.kernel.distance_rows import ROOM, write_distance_rows
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linear import copy, copy_rows
+from himpc.tick.kernel.pair_arrays import PairArrays, pair_arrays_of
 
 TICK, RESET = -2, -1
 """Requests to `control`; all other values are settings, see `adjust`."""
@@ -37,6 +41,10 @@ def control(
     whole_where: IntArray,
     loop: Array,
     loop_where: IntArray,
+    pairs: Array,
+    pairs_where: IntArray,
+    pairs_whole: IntArray,
+    pairs_whole_where: IntArray,
     what: int,
     index: int,
     x: Array,
@@ -49,6 +57,7 @@ def control(
     Args:
         data, where, whole, whole_where: the arena of a tick.
         loop, loop_where: see `loop_arrays_of`.
+        pairs, pairs_where, pairs_whole, pairs_whole_where: see `pair_arrays_of`.
         what: TICK, RESET or a setting.
         index: for TICK and RESET, whether a torque is an argument; otherwise see `adjust`.
         x: for TICK q, (n,) rad; for RESET the torque that acts now, (n,) N·m; otherwise the values of the
@@ -60,17 +69,19 @@ def control(
     """
     t = arrays_of(data, where, whole, whole_where)
     p = loop_arrays_of(loop, loop_where, t)
+    d = pair_arrays_of(pairs, pairs_where, pairs_whole, pairs_whole_where)
     if what == TICK:
-        return whole_tick(t, p, data, where, whole, whole_where, x, v, tau_applied, index, tau)
+        return whole_tick(t, p, d, data, where, whole, whole_where, x, v, tau_applied, index, tau)
     if what == RESET:
-        return restart(t, p, x, index)
-    return adjust(t, p, what, index, x, x.size)
+        return restart(t, p, d, x, index)
+    return adjust(t, p, d, what, index, x, x.size)
 
 
 @inline_kernel
 def whole_tick(
     t: TickArrays,
     p: LoopArrays,
+    d: PairArrays,
     data: Array,
     where: IntArray,
     whole: IntArray,
@@ -85,7 +96,7 @@ def whole_tick(
     `himpc.controllers.himpc.HIMPC.step` does.
 
     Args:
-        t, p: the arrays.
+        t, p, d: the arrays.
         data, where, whole, whole_where: the arena of a tick.
         q, v: measured state, (n,) rad and rad/s.
         tau_applied: the torque that acted during the last period, (n,) N·m.
@@ -104,17 +115,20 @@ def whole_tick(
         return forget(t, p)
     copy(q, t.q, q.size)
     copy(v, t.v, v.size)
+    copy(p.v_ramped, t.limits[2], v.size)
     ramp(t, p)
+    guard(t, p, d)
     fade(t, p)
     if p.state[STARTED] == 0.0:
         begin(t)
     t.scalars[NOW] = (p.state[TICKS] - 1.0) * t.scalars[T_S]
     follow(t, p, p.state[TICKS] > 1.0)
-    fallback = iterate(t, p, data, where, whole, whole_where)
+    fallback = iterate(t, p, d, data, where, whole, whole_where)
     if fallback == HOLD:
         hold(t, p)
         copy(t.tau, tau, tau.size)
         return forget(t, p)
+    remember_errors(t, p)
     p.state[STARTED] = 1.0
     copy(t.tau, tau, tau.size)
     copy(t.tau, t.tau_0, tau.size)
@@ -123,7 +137,13 @@ def whole_tick(
 
 @inline_kernel
 def iterate(
-    t: TickArrays, p: LoopArrays, data: Array, where: IntArray, whole: IntArray, whole_where: IntArray
+    t: TickArrays,
+    p: LoopArrays,
+    d: PairArrays,
+    data: Array,
+    where: IntArray,
+    whole: IntArray,
+    whole_where: IntArray,
 ) -> int:
     """Solves all levels once; for NHIMPC, it repeats this until no increment changes. Returns the last of the
     fallbacks that acted, HOLD if no torque was computed."""
@@ -137,8 +157,10 @@ def iterate(
                 copy(t.predicted[j - 1], t.path[j], t.q.size)
             for i in range(t.sizes[4]):
                 copy_rows(t.U[i], p.before[i])
+        if t.sizes[DIRECTED] > 0:
+            write_distance_rows(t, d, 0)
         parts = ALL_PARTS if most == 1 else ITERATION
-        fallback = period_with_fallbacks(t, p, data, where, whole, whole_where, parts)
+        fallback = period_with_fallbacks(t, p, d, data, where, whole, whole_where, parts)
         if fallback == HOLD:
             return HOLD
         if count:
@@ -200,7 +222,7 @@ def begin(t: TickArrays) -> None:
 
 
 @inline_kernel
-def restart(t: TickArrays, p: LoopArrays, tau: Array, known: int) -> int:
+def restart(t: TickArrays, p: LoopArrays, d: PairArrays, tau: Array, known: int) -> int:
     """Clears everything except the settings, and sets the filtered targets to their raw targets, at rest.
 
     tau: the torque that acts now, (n,) N·m; if `known` is 0, the torque is zero.
@@ -212,8 +234,9 @@ def restart(t: TickArrays, p: LoopArrays, tau: Array, known: int) -> int:
     for a in range(t.q.size):
         t.limits[0, a], t.limits[1, a], t.limits[2, a] = -math.inf, math.inf, math.inf
         t.limits[6, a], t.limits[7, a] = -math.inf, math.inf
-    for i in range(len(p.weight)):
-        p.weight[i] = 1.0
+    p.v_ramped[:], p.weight[:] = math.inf, 1.0
+    d.about[ROOM], d.about[OBJECT_SPEED] = math.inf, 0.0
+    unguarded(p)
     p.state[STARTED], p.state[TICKS], p.state[FADING] = 0.0, 0.0, 0.0
     arrange(t, p)
     write_rows(t, p, 0, t.sizes[3])

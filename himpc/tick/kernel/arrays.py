@@ -37,7 +37,8 @@ class TickArrays(NamedTuple):
         Array,
         "n",
         "rad",
-        "kinematics tick → distances fallbacks finish_tick linearize python_bounds python_rows solve_level",
+        "kinematics tick → distance_rows fallbacks finish_tick linearize python_bounds python_rows "
+        "solve_level",
     ]
     v: Annotated[
         Array,

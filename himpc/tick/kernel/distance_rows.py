@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from himpc.compilation.compiled import INDICES, MATRIX, NUMBER, VECTOR, WHOLE, inline_kernel, kernel
-from himpc.compilation.views import borrowed
+from himpc.compilation.compiled import GIVEN_VECTOR, INDICES, NUMBER, VECTOR, WHOLE, inline_kernel, kernel
 from himpc.constants import FADE, RETREAT, RETURN_RATE, WITHIN
-from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, IntArray, arrays_of
+from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, IntArray, TickArrays, arrays_of
+from himpc.tick.kernel.kinematics import forward_kinematics
+from himpc.tick.kernel.near import find_near
+from himpc.tick.kernel.pair_arrays import PairArrays, pair_arrays_of
 
 
 @inline_kernel
@@ -29,19 +31,11 @@ the link, m/s. CHANGED: 1 if other pairs are chosen than before."""
 
 
 @inline_kernel
-def approach(pair: int, other: int, normal: Array, velocity: Array) -> float:
-    """Returns the speed at which the motion of a pair's object reduces the pair's distance, m/s.
-
-    Args:
-        pair: index of the pair.
-        other: index of the pair's second shape; only the first b shapes are objects.
-        normal: unit vectors of all pairs, see `near`.
-        velocity: (b, 3) m/s, velocities of the objects.
-    """
+def approach(d: PairArrays, pair: int) -> float:
+    """Returns the speed at which the motion of a pair's object reduces the pair's distance, m/s."""
     moving = 0.0
-    if other < len(velocity):
-        for a in range(3):
-            moving += normal[pair, a] * velocity[other, a]
+    for a in range(3):
+        moving += d.normal[pair, a] * d.velocity[d.shape[pair], a]
     return moving
 
 
@@ -64,105 +58,67 @@ def soonest(room: float, slope: Any, fastest: Array, moving: float) -> float:
     return room / speed if speed > 0.0 else math.inf
 
 
-@kernel(
-    *(WHOLE, VECTOR, INDICES, INDICES, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, NUMBER),
-    *(VECTOR, INDICES, INDICES, INDICES, VECTOR, VECTOR, VECTOR),
-)
-def nearest(
-    count: int,
-    distance: Array,
-    sphere: IntArray,
-    shape: IntArray,
-    normal: Array,
-    slopes: Array,
-    shares: Array,
-    velocity: Array,
-    fastest: Array,
-    d_safe: float,
-    time: Array,
-    chosen: IntArray,
-    links: IntArray,
-    others: IntArray,
-    share: Array,
-    moving: Array,
-    about: Array,
-) -> int:
-    """Chooses those of `count` pairs that can soonest reach the distance that they must keep, see `soonest`.
-    It chooses at most as many as `chosen` can contain, sorts them by distance, and returns their number. A
+@inline_kernel
+def find_pairs(d: PairArrays, q: Array, within: float) -> int:
+    """Finds the pairs nearer than `within`, m, at the positions q, (n,); returns their number."""
+    forward_kinematics(
+        *(q, d.parent, d.is_revolute, d.column, d.factor, d.rotation, d.translation, d.axis),
+        *(d.placed[0], d.z[0]),
+    )
+    return find_near(
+        *(d.placed, d.z, d.is_revolute, d.column, d.factor, d.carries, d.joint, d.centre, d.span, d.radius),
+        *(d.kind, d.carrier, d.turn, d.middle, d.half, d.thickness, d.meets, within, d.centres, d.spans),
+        *(d.knot, d.sphere, d.shape, d.share_of_span, d.distance, d.normal, d.slopes),
+    )
+
+
+@inline_kernel
+def choose_pairs(d: PairArrays, q: Array) -> int:
+    """Finds the pairs at the positions q, (n,), and chooses those that can soonest reach the distance that
+    they must keep, see `soonest`. It chooses at most R, sorts them by distance, and returns their number. A
     near pair whose distance hardly changes is not chosen if farther pairs can approach faster.
 
-    Args:
-        count, distance, sphere, shape, normal, slopes: of all pairs, see `near`.
-        shares: (B, S) share of d_safe and the margin that each pair keeps.
-        velocity: (b, 3) m/s, velocities of the first b shapes, which are objects.
-        fastest: (n,) rad/s, the largest speeds of the joints.
-        d_safe: m.
-        time: scratch, one per pair.
-        chosen: indices of the chosen pairs; the result.
-        links, others: `sphere` and `shape` of each chosen pair, −1 where there is none; updated.
-        share, moving: of each chosen pair, see `distance_rows`; the result.
-        about: numbers about the pairs, see ROOM; the result.
+    `chosen`, `link`, `other`, `share`, `moving` and `about` are the result.
     """
-    slopes = borrowed(slopes)
-    about[ROOM], about[FASTEST], about[CHANGED] = math.inf, 0.0, 0.0
+    d.about[ROOM], d.about[FASTEST], d.about[CHANGED] = math.inf, 0.0, 0.0
+    count, chosen = find_pairs(d, q, WITHIN), d.chosen
     for r in range(count):
-        room = distance[r] - d_safe * shares[shape[r], sphere[r]]
-        about[ROOM] = min(about[ROOM], room)
-        time[r] = soonest(room, slopes[r], fastest, approach(r, shape[r], normal, velocity))
+        room = d.distance[r] - d.numbers[0] * d.shares[d.shape[r], d.sphere[r]]
+        d.about[ROOM] = min(d.about[ROOM], room)
+        d.time[r] = soonest(room, d.slopes[r], d.fastest, approach(d, r))
     number = min(count, chosen.size)
     for c in range(number):
         best = -1
         for r in range(count):
-            if time[r] < math.inf and (best < 0 or time[r] < time[best]):
+            if d.time[r] < math.inf and (best < 0 or d.time[r] < d.time[best]):
                 best = r
         if best < 0:
             number = c
             break
-        time[best] = math.inf
+        d.time[best] = math.inf
         rank = c
-        while rank > 0 and distance[chosen[rank - 1]] > distance[best]:
+        while rank > 0 and d.distance[chosen[rank - 1]] > d.distance[best]:
             chosen[rank] = chosen[rank - 1]
             rank -= 1
         chosen[rank] = best
     for c in range(chosen.size):
-        s, o = (sphere[chosen[c]], shape[chosen[c]]) if c < number else (-1, -1)
-        if links[c] != s or others[c] != o:
-            links[c], others[c], about[CHANGED] = s, o, 1.0
-        moving[c] = 0.0
+        s, o = (d.sphere[chosen[c]], d.shape[chosen[c]]) if c < number else (-1, -1)
+        if d.link[c] != s or d.other[c] != o:
+            d.link[c], d.other[c], d.about[CHANGED] = s, o, 1.0
+        d.moving[c] = 0.0
         if c < number:
-            share[c], moving[c] = shares[o, s], approach(chosen[c], o, normal, velocity)
-            about[FASTEST] = max(about[FASTEST], abs(moving[c]))
+            d.share[c], d.moving[c] = d.shares[o, s], approach(d, chosen[c])
+            d.about[FASTEST] = max(d.about[FASTEST], abs(d.moving[c]))
     return number
 
 
-@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, INDICES, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR)
-def distance_rows(
-    data: Any,
-    where: IntArray,
-    whole: IntArray,
-    whole_where: IntArray,
-    block: int,
-    count: int,
-    chosen: IntArray,
-    distance: Array,
-    slopes: Array,
-    moving: Array,
-    share: Array,
-    numbers: Array,
-) -> None:
-    """Writes the rows of pairs into `direction`, `lower` and `upper`.
+@inline_kernel
+def write_distance_rows(t: TickArrays, d: PairArrays, block: int) -> None:
+    """Chooses pairs at the measured state, and writes their rows into `direction`, `lower` and `upper`.
 
-    Args:
-        data, where, whole, whole_where: the arena.
-        block: index of the set of directions for distances.
-        count: number of pairs that have rows. chosen: indices of these pairs.
-        distance, slopes: of all pairs, see `near`.
-        moving: speed at which the object's motion reduces the distance of each chosen pair, m/s.
-        share: share of d_safe and the margin that each chosen pair keeps.
-        numbers: d_safe and margin, m, reaction, s, and deceleration, m/s².
+    block: index of the set of directions for distances.
     """
-    t = arrays_of(data, where, whole, whole_where)
-    slopes = borrowed(slopes)
+    count = choose_pairs(d, t.q)
     N, n = t.fixed.shape
     T_s, period = t.scalars[T_S], t.scalars[PERIOD]
     first, D = len(t.L) - (t.sizes[DIRECTED] - block) * N, t.direction[block]
@@ -173,16 +129,16 @@ def distance_rows(
             t.lower[first + j, c], t.upper[first + j, c] = -math.inf, math.inf
         if c >= count:
             continue
-        gradient = slopes[chosen[c]]
+        gradient = d.slopes[d.chosen[c]]
         squares, speed, gained = 0.0, 0.0, 0.0
         for a in range(n):
             squares += (gradient[a] / t.M_bar[a]) ** 2
             speed += gradient[a] * t.v[a]
             gained += gradient[a] * (t.v[a] - t.v_was[a]) / period
         length = math.sqrt(squares)
-        d: Any = distance[chosen[c]]
-        d_safe, margin = share[c] * numbers[0], share[c] * numbers[1]
-        rate = moving[c] + least_rate(d, d_safe, margin, numbers[2], numbers[3])
+        gap: Any = d.distance[d.chosen[c]]
+        d_safe, margin = d.share[c] * d.numbers[0], d.share[c] * d.numbers[1]
+        rate = d.moving[c] + least_rate(gap, d_safe, margin, d.numbers[2], d.numbers[3])
         if length == 0.0 or not math.isfinite(rate):
             continue
         for a in range(n):
@@ -191,3 +147,36 @@ def distance_rows(
             t.lower[first + j, c] = (t.approach[j] * (rate - speed) - T_s * (j + 1.0) * gained) / (
                 T_s * length
             )
+
+
+@kernel(VECTOR, INDICES, INDICES, INDICES, GIVEN_VECTOR, NUMBER)
+def near_pairs(
+    pairs: Array, pairs_where: IntArray, whole: IntArray, whole_where: IntArray, q: Array, within: float
+) -> int:
+    """Applies `find_pairs` to the arrays of an arena of pairs."""
+    return find_pairs(pair_arrays_of(pairs, pairs_where, whole, whole_where), q, within)
+
+
+@kernel(VECTOR, INDICES, INDICES, INDICES, GIVEN_VECTOR)
+def chosen_pairs(
+    pairs: Array, pairs_where: IntArray, whole: IntArray, whole_where: IntArray, q: Array
+) -> int:
+    """Applies `choose_pairs` to the arrays of an arena of pairs."""
+    return choose_pairs(pair_arrays_of(pairs, pairs_where, whole, whole_where), q)
+
+
+@kernel(VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, INDICES, INDICES, WHOLE)
+def distance_rows(
+    data: Array,
+    where: IntArray,
+    whole: IntArray,
+    whole_where: IntArray,
+    pairs: Array,
+    pairs_where: IntArray,
+    pairs_whole: IntArray,
+    pairs_whole_where: IntArray,
+    block: int,
+) -> None:
+    """Applies `write_distance_rows` to the arrays of a tick and of its pairs."""
+    d = pair_arrays_of(pairs, pairs_where, pairs_whole, pairs_whole_where)
+    write_distance_rows(arrays_of(data, where, whole, whole_where), d, block)

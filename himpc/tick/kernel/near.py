@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.compilation.compiled import (
-    FLAGS,
     INDICES,
     MATRICES,
     MATRIX,
     NUMBER,
+    TABLE,
     VECTOR,
     inline_kernel,
     kernel,
@@ -149,12 +149,8 @@ def share_of(kind: int, p: Vector3, d: Vector3, rotation: Array, half: Array) ->
     return _clipped(-(d[0] * p[0] + d[1] * p[1] + d[2] * p[2]) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]))
 
 
-@kernel(
-    *(MATRICES, MATRICES, INDICES, INDICES, VECTOR, MATRIX, INDICES, MATRIX, MATRIX, VECTOR),
-    *(INDICES, INDICES, MATRICES, MATRIX, MATRIX, VECTOR, FLAGS, NUMBER),
-    *(MATRICES, MATRICES, INDICES, INDICES, INDICES, VECTOR, VECTOR, MATRIX, MATRIX),
-)
-def near(
+@inline_kernel
+def find_near(
     placed: Array,
     z: Array,
     is_revolute: Indices,
@@ -171,7 +167,7 @@ def near(
     middle: Array,
     half: Array,
     thickness: Array,
-    meets: NDArray[np.bool_],
+    meets: Indices,
     within: float,
     centres: Array,
     spans: Array,
@@ -278,3 +274,11 @@ def near(
                 rate = u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
             add(slopes[r], column[j], factor[j] * sign * rate)
     return count
+
+
+near = kernel(
+    *(MATRICES, MATRICES, INDICES, INDICES, VECTOR, MATRIX, INDICES, MATRIX, MATRIX, VECTOR),
+    *(INDICES, INDICES, MATRICES, MATRIX, MATRIX, VECTOR, TABLE, NUMBER),
+    *(MATRICES, MATRICES, INDICES, INDICES, INDICES, VECTOR, VECTOR, MATRIX, MATRIX),
+)(find_near.py_func)
+"""`find_near` for callers in Python."""

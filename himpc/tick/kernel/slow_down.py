@@ -18,9 +18,7 @@ is near, or its first task is disturbed.
 
 from __future__ import annotations
 
-from typing import Any
-
-from himpc.compilation.compiled import FLAG, FLAGS, GIVEN_VECTOR, NUMBER, VECTOR, inline_kernel, kernel
+from himpc.compilation.compiled import FLAG, GIVEN_VECTOR, MATRIX, NUMBER, VECTOR, inline_kernel, kernel
 from himpc.constants import (
     BLOCKED,
     CLOSE_ENOUGH,
@@ -44,6 +42,7 @@ from himpc.constants import (
     STALLED,
 )
 from himpc.tick.kernel.arrays import Array
+from himpc.tick.kernel.linear import copy
 
 STALL_SHARE, STALL_LEAST = range(2)
 """Indices of the numbers about the stall: 1 if the robot is not stalled and 0 if it is completely stalled;
@@ -52,13 +51,14 @@ the smallest error of the first task after the robot was last free to move."""
 
 @inline_kernel
 def update_stall(errors: Array, moves: bool, room: float, T_s: float, due: Array, stall: Array) -> None:
-    """Computes the stall one period later; for the arguments see `slow_down`."""
+    """Computes the stall one period later; for the arguments see `lower_velocities`."""
     far, free = False, moves or not INSIDE <= room <= BLOCKED
     for p in range(len(errors)):
         far = far or errors[p] > CLOSE_ENOUGH
     brakes, rests = REST < stall[STALL_SHARE] < STALLED, stall[STALL_SHARE] <= REST
     if free or not far or (errors[0] > stall[STALL_LEAST] + DISTURBED and not brakes):
-        due[:], stall[STALL_LEAST], slows = errors, errors[0], False
+        copy(errors, due, len(errors))
+        stall[STALL_LEAST], slows = errors[0], False
     else:
         nearer = False
         for p in range(len(errors)):
@@ -70,16 +70,13 @@ def update_stall(errors: Array, moves: bool, room: float, T_s: float, due: Array
     stall[STALL_SHARE] += min(1.0, T_s / seconds) * (goal - stall[STALL_SHARE])
 
 
-@kernel(
-    *(VECTOR, VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, FLAGS, NUMBER, FLAG, NUMBER),
-    *(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR),
-)
-def slow_down(
+@inline_kernel
+def lower_velocities(
     v_limit: Array,
     largest_torque: Array,
     tau: Array,
     v: Array,
-    carried: Any,
+    carried: Array,
     room: float,
     moves: bool,
     T_s: float,
@@ -132,3 +129,10 @@ def slow_down(
         for a in range(n):
             slow = min(slower[a], SLOWEST)
             slower[a] = slow + max(stall[STALL_SHARE], LEAST_SHARE) * (slower[a] - slow)
+
+
+slow_down = kernel(
+    *(VECTOR, VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, MATRIX, NUMBER, FLAG, NUMBER),
+    *(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR),
+)(lower_velocities.py_func)
+"""`lower_velocities` for callers in Python."""
