@@ -16,6 +16,8 @@ from robots import InputError, Robot
 from robots.ranges import Range, Shown, check_fields, check_numbers
 
 Weight = float | tuple[float, ...]
+WEIGHTS = Range(1e-12, 1e12)
+"""Beyond, the smaller terms of a cost are lost in the rounding of the larger ones."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +33,10 @@ class Level:
 
     tasks: tuple[Task, ...]
     # fmt: off
-    Q: Annotated[Weight, Range(0.0, above=True), Shown(
+    Q: Annotated[Weight, WEIGHTS, Shown(
         "Q", "Weight of the residual", "", 1.0, 1000.0, 1.0, tries=("20", "100", "200", "500", "2000"),
         name="Q of *")] = 200.0
-    R: Annotated[Weight, Range(0.0, above=True), Shown(
+    R: Annotated[Weight, WEIGHTS, Shown(
         "R", "Weight of the changes of torque", "", 0.1, 100.0, 0.1, tries=("1", "10", "100", "1000"),
         name="R of *")] = 10.0
     horizon: Annotated[int | None, Range(1), Shown(

@@ -43,6 +43,8 @@ class Range:
 
 
 ANY = Range()
+SCALE = Range(1e-6, 1e6)
+"""The range of a factor on limits, or on M̄."""
 
 
 @dataclass(frozen=True)

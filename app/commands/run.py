@@ -163,8 +163,8 @@ def _show(result: dict[str, Any]) -> None:
     width = max(map(len, pairs))
     for name, value in pairs.items():
         print(f"{name:{width}}  {value}")
-    if result.get("period_too_long"):
-        print(result["period_too_long"])
+    if result.get("warning"):
+        print(result["warning"])
 
 
 def _ranks(result: dict[str, Any]) -> dict[str, str]:

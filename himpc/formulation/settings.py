@@ -34,7 +34,7 @@ class Settings:
 
     stack: Stack
     # fmt: off
-    M_bar: Annotated[tuple[float, ...], Range(0.0, above=True), Shown(
+    M_bar: Annotated[tuple[float, ...], Range(1e-12, 1e6), Shown(
         "M̄", "The diagonal of M̄, one number per joint, before scaling", "kg·m²")]
     M_bar_adapt: Annotated[bool, Shown(
         "M̄ adapts to the payload", "The controller estimates the payload from the torque against gravity, "
@@ -44,8 +44,9 @@ class Settings:
         "N", "Number of knots of the prediction horizon; 1 is the inverse dynamics hierarchy", low=1, high=30,
         tries=("1", "2", "5", "10", "20"), name="horizon N", group="Horizon")] = 5
     T_s: Annotated[float, Range(1e-4, 0.02), Shown(
-        "T_s", "Control period; also the time allowed for each control step", "s", 0.5, 5.0, 0.5,
-        page_unit="ms", factor=1000.0, tries=("0.002", "0.004", "0.001"), name="control period T_s, s",
+        "T_s", "Control period; also the time allowed for each control step. Above 1 ms, the longest period "
+        "depends on M̄: with a longer one the robot would swing", "s", 0.5, 5.0, 0.5, page_unit="ms",
+        factor=1000.0, tries=("0.002", "0.0005", "0.001"), name="control period T_s, s",
         group="Horizon")] = 1e-3
     limits: Limits = field(default_factory=Limits)
     solver: Annotated[Solver, Shown(

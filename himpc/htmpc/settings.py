@@ -13,7 +13,7 @@ from himpc.qp import Solver, is_installed
 from himpc.stack import Stack, Weight, check_names
 from robots import InputError, Robot
 from robots.collision import Obstacle
-from robots.ranges import Range, Shown, check_fields
+from robots.ranges import SCALE, Range, Shown, check_fields
 
 Array = NDArray[np.float64]
 Formulation = Literal["proximal", "paper"]
@@ -24,6 +24,7 @@ FORMULATIONS: tuple[Formulation, ...] = ("proximal", "paper")
 LEXICOGRAPHIC: tuple[Lexicographic, ...] = ("per_coordinate", "cost")
 MAX_HORIZON = 40
 _SCALE = "Factor on the limits of the robot"
+_WEIGHTS = Range(0.0, 1e9)
 _EFFORT = "Weight in the effort (10), equal for all joints"
 
 
@@ -40,13 +41,13 @@ class MotionLimits:
     acceleration: Annotated[bool, Shown(
         "Acceleration", "Impose the acceleration limits", name="acceleration limits", group="Limits")] = True
     jerk: Annotated[bool, Shown("Jerk", "Impose the jerk limits", name="jerk limits", group="Limits")] = True
-    velocity_scale: Annotated[float, Range(0.0, above=True), Shown(
+    velocity_scale: Annotated[float, SCALE, Shown(
         "Velocity scale", _SCALE, "", 0.1, 2.0, 0.05, group="Limits")] = 1.0
-    acceleration_scale: Annotated[float, Range(0.0, above=True), Shown(
+    acceleration_scale: Annotated[float, SCALE, Shown(
         "Acceleration scale", _SCALE, "", 0.1, 2.0, 0.05, group="Limits")] = 1.0
-    jerk_scale: Annotated[float, Range(0.0, above=True), Shown(
+    jerk_scale: Annotated[float, SCALE, Shown(
         "Jerk scale", _SCALE, "", 0.1, 2.0, 0.05, group="Limits")] = 1.0
-    jerk_limit: Annotated[Weight | None, Range(0.0), Shown(
+    jerk_limit: Annotated[Weight | None, Range(0.0, 1e9), Shown(
         "Jerk limit", "Jerk limit per joint; null: 10 for the base, 80 for the arm", "rad/s³ or m/s³")] = None
     # fmt: on
 
@@ -111,11 +112,11 @@ class HTMPCSettings:
     )] = 1
     terminal: Annotated[float, Range(0.0, 1e6), Shown(
         "P / Q", "Weight of the last knot relative to the others, (8)", "", 0, 100, 1)] = 10.0
-    velocity_effort: Annotated[Weight, Range(0.0), Shown("S velocities", _EFFORT, "", 0.0, 2.0, 0.01)] = 0.1
-    input_effort: Annotated[Weight | None, Range(0.0), Shown("R inputs", _EFFORT, "", 0.0, 1.0, 0.01)] = None
-    change_effort: Annotated[Weight | None, Range(0.0), Shown(
+    velocity_effort: Annotated[Weight, _WEIGHTS, Shown("S velocities", _EFFORT, "", 0.0, 2.0, 0.01)] = 0.1
+    input_effort: Annotated[Weight | None, _WEIGHTS, Shown("R inputs", _EFFORT, "", 0.0, 1.0, 0.01)] = None
+    change_effort: Annotated[Weight | None, _WEIGHTS, Shown(
         "W changes", _EFFORT, "", 0.0, 1.0, 0.01)] = None
-    gains: Annotated[tuple[float, ...], Range(0.0), Shown(
+    gains: Annotated[tuple[float, ...], Range(0.0, 1e4), Shown(
         "Gains", "Gains of HTIDKC and placo, one per level: ẋ = ṙ + gain · (r − x)", "1/s",
     ), Shown("Gain of level *", "ẋ = ṙ + gain · (r − x)", "1/s", 0.0, 3.0, 0.05)] = (0.5, 0.3)
     rho: Annotated[float, Range(1e-8, 1e3), Shown(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.limits.avoidance import Avoidance
 from robots import InputError, Robot
-from robots.ranges import Folder, Range, Shown, check_fields
+from robots.ranges import SCALE, Folder, Range, Shown, check_fields
 
 Array = NDArray[np.float64]
 PositionMode = Literal["viability", "paper", "off"]
@@ -39,9 +39,9 @@ class Limits:
         "Position", "viability: limits the speed to one from which the joint can still stop. paper: the rows "
         "as printed, which a horizon of a few milliseconds cannot keep, as the list of fallbacks shows",
         tries=("paper", "off", "viability"), name="position limits", group="Limits")] = "viability"
-    torque_scale: Annotated[float, Range(0.0, above=True), Shown(
+    torque_scale: Annotated[float, SCALE, Shown(
         "Torque scale", "One factor on the robot's torque limits", "", 0.05, 2.0, 0.01, group="Limits")] = 1.0
-    velocity_scale: Annotated[float, Range(0.0, above=True), Shown(
+    velocity_scale: Annotated[float, SCALE, Shown(
         "Velocity scale", "One factor on the robot's velocity limits", "", 0.05, 2.0, 0.01, group="Limits",
     )] = 1.0
     velocity_approach: Annotated[float, Range(0.0, 1e4), Shown(

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from himpc.references.target import POSITION_CAPS
 from lessons.events import MoveTarget
 from lessons.scenes.hold import hold_robot
 from lessons.session.start import begin
@@ -26,7 +27,8 @@ Array = NDArray[np.float64]
 
 SHARE = 0.15
 """Length of the drag as a share of the arm's length."""
-START, HOLD = 0.1, 2.0  # s: when the target moves first, and how long it stays at each place
+START, HOLD = 0.1, 2.0  # s: when the target moves first, and how long it is at least at each place
+_REST = 1.0  # s: least part of this time after the target, which moves with a limited speed, is there
 FOLLOWS = 0.01  # largest error, as a share of the drag, of a robot that follows
 _MARGIN = 0.02  # rad or m: nearest that a joint comes to its limit at a target
 _NEAR = 2e-3  # m: difference from the distance to keep at which it holds a robot back
@@ -40,8 +42,8 @@ class Motion:
 
     Attributes:
         drag: length of the drag, m; 0 if no target was found that the tip can reach.
-        error: distance of the tip from the target 2 s after the drag, m.
-        back: the same 2 s after the way back.
+        error: distance of the tip from the target `seconds` after the drag, m.
+        back: the same after the way back.
         torque, speed: largest share of a joint's limit.
         rest: whether all joints are at rest at the end.
         lost: simulated time at which control was lost, s; None if it was not.
@@ -60,6 +62,11 @@ class Motion:
     why: str = ""
 
     @property
+    def seconds(self) -> float:
+        """How long the target was held, s: 2 s, and longer if it needs more than 1 s for the drag."""
+        return max(HOLD, self.drag / POSITION_CAPS.speed + _REST)
+
+    @property
     def follows(self) -> bool:
         """Whether the tip was within 1 % of the drag both times, and control was not lost."""
         return self.lost is None and max(self.error, self.back) <= FOLLOWS * self.drag
@@ -72,17 +79,19 @@ class Motion:
         if self.lost is not None:
             return f"loses control {self.lost:.1f} s after the start of a drag of {1e3 * self.drag:.0f} mm"
         worst, drag = 1e3 * max(self.error, self.back), 1e3 * self.drag
-        end = "at rest" if self.rest else "still moving 2 s after the way back"
+        after = f"{self.seconds:.2g} s"
+        end = "at rest" if self.rest else f"still moving {after} after the way back"
         how = f"follows within {worst:.2g} mm" if self.follows else f"stays {worst:.2g} mm away"
         return (
-            f"{how} after 2 s (drag of {drag:.0f} mm); uses {100 * self.torque:.0f} % of a torque limit and "
-            f"{100 * self.speed:.0f} % of a speed limit; {end}{f' ({self.why})' if self.why else ''}"
+            f"{how} after {after} (drag of {drag:.0f} mm); uses {100 * self.torque:.0f} % of a torque limit "
+            f"and {100 * self.speed:.0f} % of a speed limit; {end}{f' ({self.why})' if self.why else ''}"
         )
 
 
 def dragged(robot: Robot) -> Motion:
     """Drags the target of a robot's hold scene by 15 % of the arm's length (see `target`), holds it there for
-    2 s, and drags it back for 2 s, with HIMPC and the scene's own settings."""
+    2 s, and drags it back for 2 s, with HIMPC and the scene's own settings. A drag of more than 0.5 m takes
+    longer, see `Motion.seconds`."""
     scene = hold_robot(robot)
     length = SHARE * chain_length(robot.model, robot.frame_id(robot.tip))
     avoidance = scene.settings.limits.avoidance
@@ -91,14 +100,15 @@ def dragged(robot: Robot) -> Motion:
     if there is None:
         return Motion(0.0)
     points, drag = (there, home), float(np.linalg.norm(there - home))
+    hold = Motion(drag).seconds
     events = tuple(
-        (START + k * HOLD, MoveTarget("position", tuple(map(float, point)))) for k, point in enumerate(points)
+        (START + k * hold, MoveTarget("position", tuple(map(float, point)))) for k, point in enumerate(points)
     )
     session = begin(replace(scene, events=events), 0)
     errors, torque, speed, why, began = [], 0.0, 0.0, "", process_time()
     at, row = session.layout.fields, np.empty(0)
     for point in points:
-        while session.t < START + (len(errors) + 1) * HOLD - 0.5 * session.settings.T_s:
+        while session.t < START + (len(errors) + 1) * hold - 0.5 * session.settings.T_s:
             row = session.tick()
             torque = max(torque, float(np.abs(row[at["tau"]] / robot.tau_limit).max()))
             speed = max(speed, float(np.abs(row[at["v"]] / robot.v_limit).max()))

@@ -9,21 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.catalog import WITH_MODEL, qp_method
+from himpc.catalog import qp_method
 from himpc.telemetry import TaskInfo
 from lessons.recording.run import Recording
 from lessons.session.session import Session
 from lessons.session.torque import TorqueSession
 from lessons.session.velocity import VelocitySession
-from lessons.settings.torque import TorqueSettings
+from lessons.settings.period import warning
 from lessons.settings.values import finite, peak
-from robots import Plant, Robot, tracking_bandwidth
 
 Array = NDArray[np.float64]
-
-_SLOWEST = 3.0
-"""Bandwidth, 1/s, of a robot that is slow but does not swing. panda-hold follows with 3.1 1/s, and swings
-with 1.5 1/s."""
 
 
 def summary(recording: Recording) -> dict[str, Any]:
@@ -90,7 +85,7 @@ def _torque(recording: Recording) -> dict[str, Any]:
         "dynamic_leak_max": peak(recording["dynamic_leak"]),
         "bound_active_share": float((recording["at_bound"] > 0).any(axis=1).mean()),
         "late_ticks": int(recording["late"].sum()),
-        "period_too_long": _period_too_long(session.robot, settings),
+        "warning": warning(session.robot, settings) or None,
         "contact": _contact(recording),
     }
 
@@ -138,28 +133,6 @@ def _share(tau: Array, recording: Recording) -> Array:
 def _bounded(limit: Array) -> Array:
     """NaN where there is no limit: unbounded joints are left out."""
     return np.where(np.isfinite(limit), limit, np.nan)
-
-
-def _period_too_long(robot: Robot, settings: TorqueSettings) -> str | None:
-    """Returns the sentence for a T_s that lets the robot swing; None for a shorter one.
-
-    The lag of time-delay estimation is T_s/λ_min(M⁻¹M̄), at home. Lower gains do not help if it is long: the
-    estimate then follows gravity and coupling too slowly.
-    """
-    if settings.controller in WITH_MODEL:
-        return None
-    M, M_bar = Plant(robot, settings.plant).mass_matrix(), np.array(settings.M_bar) * settings.M_bar_scale
-    longest = tracking_bandwidth(M, M_bar, _SLOWEST)
-    if settings.T_s <= longest:
-        return None
-    return (
-        f"T_s = {1e3 * settings.T_s:.3g} ms is too long for {robot.name}: time-delay estimation with its M̄ "
-        f"lags, and the robot swings. Choose at most {1e3 * longest:.2g} ms, or add rotor inertia "
-        "(plant.armature) and a larger M̄."
-    )
-
-
-# ---------------------------------------------------------------- at velocity level
 
 
 def _velocity(recording: Recording) -> dict[str, Any]:

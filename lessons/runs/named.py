@@ -45,10 +45,13 @@ def check_scene(scene: Scene) -> None:
                 f"its references are {shortened(repr(references), 80)}: return a dict of references by task "
                 f"name; the tasks are {', '.join(names)}"
             )
-    session = begin(scene)
-    for _, event in scene.events:
+    session = begin(replace(scene, events=()))
+    for number, (_, event) in enumerate(scene.events, start=1):
         session.post(event)
-    session.drain()
+        session.drain()
+        if len(session.log) < number:
+            raise InputError(session.notices[-1])
+    session.notices.clear()  # the scene may show what happens with settings that a notice is about
     session.tick()
     if session.notices:
         raise InputError(session.notices[0])

@@ -23,7 +23,8 @@ TOUCHING = PlantSettings(contacts=True, joint_stops=True)
 DRAGGED = Limits(stall_guard=True, avoidance=Avoidance(on=True))
 """The limits of scenes with dragged targets: a target may be in an object, in the robot or out of reach. The
 scenes of the papers have the printed rows alone."""
-PLANAR3_PLANT = replace(TOUCHING, armature=(0.05, 0.05, 0.03))
+PLANAR3_ARMATURE = {"joint_1": 0.05, "joint_2": 0.05, "joint_3": 0.03}
+PLANAR3_PLANT = replace(TOUCHING, armature=tuple(PLANAR3_ARMATURE.values()))
 """The paper's M̄ = 0.033 requires geared motors: without armature the loop would be unstable."""
 _HEAVY = 1.0  # kg·m²
 """Largest element of M̄ up to which R weighs torques, as printed. Q weighs m/s², so for a robot of two tonnes
@@ -31,18 +32,8 @@ R = 10 of its N·m would outweigh Q, and the robot would swing."""
 
 
 def hold_of(name: str) -> TorqueScene:
-    """Returns the hold scene of a catalog robot.
-
-    For the iiwa this M̄ is smaller than the paper's. The paper's M̄ was tuned for one motion; in a few per
-    cent of the work space (arm folded above the base) the loop is unstable with it. A dragged target can be
-    anywhere.
-    """
-    robot = load_robot(name)
-    if name == "iiwa14":
-        safe = suggest_M_bar(robot.model, robot.q_lower, robot.q_upper)
-        robot = replace(robot, M_bar=np.minimum(robot.M_bar, safe))
-    plant = PLANAR3_PLANT if name == "planar3" else TOUCHING
-    return replace(_hold(robot, plant), name=f"{name}-hold")
+    """Returns the hold scene of a catalog robot."""
+    return replace(hold_robot(load_robot(name)), name=f"{name}-hold")
 
 
 def hold(
@@ -67,8 +58,19 @@ def hold(
 
 
 def hold_robot(robot: Robot) -> TorqueScene:
-    """Returns the hold scene of a robot that is loaded already."""
-    return _hold(robot, PLANAR3_PLANT if robot.name == "planar3" and robot.n == 3 else TOUCHING)
+    """Returns the hold scene of a robot that is loaded already.
+
+    For the iiwa this M̄ is smaller than the paper's. The paper's M̄ was tuned for one motion; in a few per
+    cent of the work space (arm folded above the base) the loop is unstable with it. A dragged target can be
+    anywhere.
+    """
+    if robot.name == "iiwa14":
+        safe = suggest_M_bar(robot.model, robot.q_lower, robot.q_upper)
+        robot = replace(robot, M_bar=np.minimum(robot.M_bar, safe))
+    if robot.name == "planar3" and set(robot.joint_names) <= PLANAR3_ARMATURE.keys():
+        armature = tuple(PLANAR3_ARMATURE[name] for name in robot.joint_names)
+        return _hold(robot, replace(TOUCHING, armature=armature))
+    return _hold(robot, TOUCHING)
 
 
 def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:

@@ -9,7 +9,6 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.catalog import CONTROLLERS, WITH_MODEL
 from himpc.controllers import Controller
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Plan, write_plan
@@ -27,21 +26,17 @@ from lessons.session.distances import Clearance, objects_of
 from lessons.session.rows import at_once, dynamic_leak
 from lessons.session.session import Session
 from lessons.session.targets import carried, kept, move_target, target_at
+from lessons.settings.period import check_period, warning
 from lessons.settings.settings import SceneSettings
 from lessons.settings.stack import same_tasks
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Plant, PlantState, Robot, convergence_gauge
-from robots.inertia import tracking_bandwidth
 from robots.mechanics.model import compiled
 
 Array = NDArray[np.float64]
 
 TRUTH_TICKS = 20
 """Ticks between two updates of the values that need the plant's M (gauge of M̄, true leak)."""
-
-_SWINGS = 2.0
-"""√K_p, divided by the largest bandwidth of a well-damped loop, above which a notice says that the robot may
-swing."""
 
 
 class ControllerInput(NamedTuple):
@@ -75,6 +70,7 @@ class TorqueSession(Session[Plan]):
         not fit its robot."""
         super().__init__(scene, seed, Plant(scene.robot, scene.settings.plant, world=scene.world))
         self._controller_of = controllers
+        check_period(scene.robot, scene.settings)
         self.controller = self._controller_of(scene.settings, scene.robot)
         self._arrange(layout_of(scene.robot, scene.settings.levels))
         self.clearance = Clearance(self.plant)
@@ -150,6 +146,7 @@ class TorqueSession(Session[Plan]):
 
     def adopt(self, settings: SceneSettings) -> None:
         assert isinstance(settings, TorqueSettings)
+        check_period(self.robot, settings)
         layout, references = self.layout, self.references
         recomposed = not same_tasks(settings.levels, self.settings.levels)
         if recomposed:
@@ -166,22 +163,10 @@ class TorqueSession(Session[Plan]):
         if recomposed:
             self.references, self.plan, self.controller_input = references, None, None
             self._arrange(layout)
-        longer = settings.T_s > self.settings.T_s
-        self.settings = settings
-        if longer and settings.controller in CONTROLLERS and settings.controller not in WITH_MODEL:
-            self._tell_lag()
-
-    def _tell_lag(self) -> None:
-        """Leaves a notice if time-delay estimation is too slow for the gains (see `tracking_bandwidth`)."""
-        gains = [task.K_p for task in _tasks(tuple(each for each in self.settings.levels if each.enabled))]
-        fastest = math.sqrt(max((float(np.max(K_p)) for K_p in gains), default=0.0))
-        bandwidth = tracking_bandwidth(self.plant.mass_matrix(), self.M_bar, self.settings.T_s)
-        if fastest > _SWINGS * bandwidth:
-            ms = 1e3 * self.settings.T_s
-            self.notices.append(
-                f"T_s = {ms:g} ms: with this M̄, time-delay estimation allows a bandwidth of {bandwidth:g} "
-                f"1/s, and √K_p is {fastest:.3g} 1/s: the robot may swing. A shorter T_s helps."
-            )
+        before, self.settings = self.settings, settings
+        told = warning(self.robot, settings)
+        if told and not warning(self.robot, before):
+            self.notices.append(told)
 
     def _hand_over(self, taking: Controller) -> None:
         taking.reset(self.plant.tau)

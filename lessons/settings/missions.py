@@ -87,7 +87,7 @@ class ArchitectureOptions(MissionOptions):
         "Architecture", "hierarchical: the robot carries out two tasks at a time. single_task: one task at a "
         "time, with the whole body. decoupled: one task at a time, with the base or the arm",
     )] = "hierarchical"
-    base_tolerance: Annotated[float, Range(0.0, above=True), Shown(
+    base_tolerance: Annotated[float, Range(0.0, 1e3, above=True), Shown(
         "Base is there within", "The task of the base is completed within this distance of its goal, for "
         "every architecture; takes effect at the next start. decoupled needs 0.05 m and a base at rest", "m",
         0.02, 1.0, 0.01, tries=("0.05", "0.25", "0.5"), name="base is there within, m")] = 0.8
@@ -163,9 +163,9 @@ class SquareOptions(OrderOptions):
     """
 
     # fmt: off
-    peak: Annotated[tuple[float, ...], Shown(
+    peak: Annotated[tuple[float, ...], Range(-1e3, 1e3), Shown(
         "Peak", "Goal of the base, x and y in the world frame", "m")] = (0.4, -1.75)
-    half_period: Annotated[float, Range(0.0, above=True), Shown(
+    half_period: Annotated[float, Range(0.0, 1e5, above=True), Shown(
         "Half period", "Duration of each of the two parts", "s", 1.0, 20.0, 0.5)] = 8.0
     # fmt: on
 
@@ -221,9 +221,9 @@ class WaypointOptions(ArchitectureOptions):
     """
 
     # fmt: off
-    height: Annotated[float, Shown(
+    height: Annotated[float, Range(-1e3, 1e3), Shown(
         "Height", "Height of the first waypoint of the hand", "m", 0.3, 1.5, 0.05)] = 0.8
-    hold_s: Annotated[float, Shown(
+    hold_s: Annotated[float, Range(0.0, 1e5), Shown(
         "Hold", "Time that the hand stays at each goal; null: until it is released", "s", 0.0, 5.0, 0.25,
     )] = 1.0
     # fmt: on
@@ -266,14 +266,14 @@ class DeliveryOptions(ArchitectureOptions):
     """
 
     # fmt: off
-    hold_s: Annotated[float | None, Shown(
+    hold_s: Annotated[float | None, Range(0.0, 1e5), Shown(
         "Hold", "Time that the hand stays at each goal; null: until it is released", "s", 0.0, 5.0, 0.25,
     )] = 1.0
     seats: Annotated[tuple[float, ...], Shown(
         "Seats", "Numbers of the people's seats, 0 to 5, in the order of the visits")] = (0, 2, 5)
     rounds: Annotated[int, Range(1, MAX_VISITS), Shown(
         "Rounds", "Number of visits to each person", low=1, high=10)] = 4
-    cruise: Annotated[float, Shown(
+    cruise: Annotated[float, Range(0.0, 100.0, above=True), Shown(
         "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05)] = CRUISE
     # fmt: on
 
@@ -318,7 +318,10 @@ CLUTTER: tuple[Obstacle, ...] = (
 class ClutteredOptions(MissionOptions):
     """The base is sent past obstacles; the EE goes first to a place beside the way."""
 
-    goal: Annotated[tuple[float, ...], Shown("Goal", "Goal of the base, x and y", "m")] = (4.0, 0.0)
+    goal: Annotated[tuple[float, ...], Range(-1e3, 1e3), Shown("Goal", "Goal of the base, x and y", "m")] = (
+        4.0,
+        0.0,
+    )
 
     def mission(self, home: Home) -> Mission:
         return (
@@ -348,7 +351,7 @@ class PerceptionOptions(OrderOptions):
     """
 
     # fmt: off
-    cruise: Annotated[float, Range(0.0, above=True), Shown(
+    cruise: Annotated[float, Range(0.0, 100.0, above=True), Shown(
         "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05)] = CRUISE
     false_report: Annotated[bool, Shown(
         "Reported wrongly", "Whether a wrong position of the crate is reported to the controller for a while",
@@ -356,9 +359,9 @@ class PerceptionOptions(OrderOptions):
     report_offset: Annotated[tuple[float, ...], Range(-10.0, 10.0), Shown(
         "Reported minus true position", "Position of the crate as it is reported, minus its true position, "
         "while the report is wrong", "m", -3.0, 3.0, 0.05)] = (0.0, -1.1, 0.0)
-    report_start: Annotated[float, Range(0.0), Shown(
+    report_start: Annotated[float, Range(0.0, 1e5), Shown(
         "Wrong from", "Time from which the report is wrong", "s", 0.0, 12.0, 0.5)] = 1.0
-    report_end: Annotated[float, Range(0.0), Shown(
+    report_end: Annotated[float, Range(0.0, 1e5), Shown(
         "Right again from", "Time from which the report is right again", "s", 0.0, 12.0, 0.5,
         tries=("5", "6", "7", "8", "9"), name="report right again from, s")] = 7.0
     # fmt: on

@@ -20,7 +20,7 @@ from lessons.settings.stack import CHANGES, Own, add, moved, ordered, read_stack
 from lessons.settings.values import WORD, Form
 from robots import InputError, PlantSettings, Robot
 from robots.errors import shortened, unknown_name
-from robots.ranges import Range, Shown
+from robots.ranges import SCALE, Range, Shown
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class TorqueSettings(ControllerSettings, SceneSettings):
     controller: Annotated[str, Shown(
         "Controller", "You can switch the controller while the robot moves; within a few tenths of a second, "
         "the torque becomes that of the new controller")] = "himpc"
-    M_bar_scale: Annotated[float, Range(0.0, above=True), Shown(
+    M_bar_scale: Annotated[float, SCALE, Shown(
         "M̄ scale", "One factor on the whole diagonal of M̄", "", 0.1, 5.0, 0.05,
         tries=("4", "2", "1", "0.5"), group="Inertia estimate M̄")] = 1.0
     deadline_ms: Annotated[float, Range(0.0, 1e3), Shown(

@@ -46,13 +46,13 @@ def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
     supports = robot.model.supports
     longest = max(max(map(len, supports)) - 1, 1)
     weights = {k: 1.0 - _TAPER * (1.0 - (len(own) - 1) / longest) for k, own in enumerate(supports)}
-    best = _checked(robot, covering(surfaces, weights))
+    best = checked(robot, covering(surfaces, weights))
     for _ in range(tries - 1):
         close = {each for pair in own_pairs(robot, best) for each in (pair.first, pair.second)}
         if not close:
             break
         weights = {joint: weight * (_CLOSE if joint in close else 1.0) for joint, weight in weights.items()}
-        now = _checked(robot, covering(surfaces, weights))
+        now = checked(robot, covering(surfaces, weights))
         best = min(best, now, key=lambda each: len(each.excluded))
     return best
 
@@ -72,7 +72,7 @@ def near(robot: Robot, q: np.ndarray, distance: float) -> set[Bodies]:
     return touching(replace(robot, collision=CollisionModel(solids, robot.cover.excluded)), q, distance)
 
 
-def _checked(robot: Robot, capsules: tuple[Capsule, ...]) -> Cover:
+def checked(robot: Robot, capsules: tuple[Capsule, ...]) -> Cover:
     """Returns the cover with these capsules and the pairs to leave out."""
     solids = tuple(map(as_solid, capsules))
     found = Cover(capsules, collision_model(robot, solids, near_home=NEAR).excluded)

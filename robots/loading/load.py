@@ -10,21 +10,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-
-from robots.catalog import CATALOG, CatalogEntry
+from robots.catalog import CATALOG
 from robots.errors import InputError, shortened, unknown_name
-from robots.geometry import CollisionModel, Cover, stored
-from robots.joints import joint_names
 from robots.loading.archive import MAX_PACKED, description, unpack
+from robots.loading.catalog_robot import catalog_robot
 from robots.loading.imported import with_cover, with_geometry
-from robots.loading.importing import Import, bounds, import_robot
+from robots.loading.importing import Import, import_robot
 from robots.meshes.files import has_meshes
 from robots.processes.isolation import Allowance, Fault, isolated
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
-from robots.urdf import canonicalise, load_bytes
-from robots.urdf.tip import TOOL
+from robots.urdf import load_bytes
 
 _SHORT = 200_000  # bytes; the robots of the last four files up to this size stay in memory
 _GEOMETRY = Allowance(24.0)
@@ -45,28 +41,19 @@ def load_robot(
     within: a folder, given without symbolic links. It must contain the URDF file and its meshes, except
     installed meshes. None: files may be anywhere.
     hold: joints that are not controlled, "REGEX" or "REGEX=VALUE" with the whole name of a joint or a regular
-    expression for it, and the value at which it is held, rad or m (0 without it, and always inside its
-    limits). Home, M̄ and shapes of a robot of the catalog with held joints or a tool are estimated as for a
-    file.
+    expression for it, and the value at which it is held, rad or m, inside its limits; without a value it is
+    held where the home of the file or of the catalog has it, or at 0.
 
     Raises InputError for an unknown name, a missing file, a description that cannot be used, an unknown tip,
     or a pattern that fits no joint. The message is one sentence that tells the user what to do.
     """
     text = str(name_or_path)
-    if text in CATALOG and (hold or TOOL in (tip or "")):
-        return import_file(CATALOG[text].path, _on(CATALOG[text].tip, tip), hold=hold).used()
     if text in CATALOG:
-        robot = _catalog_robot(CATALOG[text])
-        return robot if tip is None else robot.with_tip(tip)
+        return catalog_robot(CATALOG[text], tip, hold)
     path = Path(text)
     if "/" not in text and not path.suffix and not _exists(path):
         raise unknown_name("robot in the catalog called", text, CATALOG, "or give the path of a URDF file")
     return import_file(path, tip, within, hold).used()
-
-
-def _on(tip: str, asked: str | None) -> str:
-    """Returns the tip that was asked for; a tool without a frame is on the tip of the catalog."""
-    return tip + asked if asked is not None and asked.startswith(TOOL) else asked or tip
 
 
 def load_urdf_text(text: str | bytes, tip: str | None = None, hold: tuple[str, ...] = ()) -> Robot:
@@ -206,30 +193,6 @@ def _imported(*document: Any) -> Import:
         return found
     robot = with_cover(found.robot)
     return Import(robot.report, robot)
-
-
-def _catalog_robot(entry: CatalogEntry) -> Robot:
-    canonical, report = canonicalise(load_bytes(entry.path), f"robots/{entry.name}", entry.path.parent)
-    assert canonical is not None, report.findings
-    model = canonical.model
-    lower, upper = bounds(model)
-    return Robot(
-        name=entry.name,
-        model=model,
-        joint_names=joint_names(model),
-        tip=entry.tip,
-        home=entry.home,
-        q_lower=lower,
-        q_upper=upper,
-        v_limit=model.velocityLimit,
-        tau_limit=model.effortLimit,
-        a_max=np.array(entry.a_max),
-        M_bar=np.array(entry.M_bar),
-        urdf_text=canonical.text,
-        report=replace(report, tip=entry.tip),
-        collision=stored(CollisionModel, entry.collision_path),
-        cover=stored(Cover, entry.cover_path),
-    )
 
 
 def _exists(path: Path) -> bool:

@@ -207,18 +207,23 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
 def test_the_slider_of_the_period_ends_where_the_arm_would_swing(
     viser_server: viser.ViserServer, name: str, longest: float
 ) -> None:
-    """A code or a lesson may set a longer period: the slider then reaches it."""
+    """The end follows M̄ and the controller: half of M̄ halves it, down to 1 ms, and a model has no lag."""
     scene, bindings = torque_scene(name), Bindings(lambda _: None, viser_server.get_event_loop())
-    for T_s in (1e-3, 0.02):
-        viser_server.gui.reset()
-        settings = scene.settings.changed("T_s", T_s)
-        page = MagicMock(gui=viser_server.gui, bindings=bindings, settings=settings, robot=scene.robot)
-        page.client = page
-        HorizonPanel(page)
-        handles = viser_server.gui._gui_input_handle_from_uuid.values()
-        sliders = [each for each in handles if isinstance(each, viser.GuiSliderHandle)]
-        (slider,) = (each for each in sliders if "T_s" in each.label)
-        assert slider.max == max(longest, 1e3 * T_s) and slider.value == 1e3 * T_s
+    viser_server.gui.reset()
+    page = MagicMock(gui=viser_server.gui, bindings=bindings, settings=scene.settings, robot=scene.robot)
+    page.client = page
+    HorizonPanel(page)
+    handles = viser_server.gui._gui_input_handle_from_uuid.values()
+    sliders = [each for each in handles if isinstance(each, viser.GuiSliderHandle)]
+    (slider,) = (each for each in sliders if "T_s" in each.label)
+    for path, value, end in (
+        ("horizon", 5, longest),
+        ("M_bar_scale", 0.5, 5.0 if name == "planar3-hold" else 1.0),
+        ("controller", "osf", 5.0),
+        ("horizon", 6, longest),
+    ):
+        bindings._write(scene.settings.changed(path, value))
+        assert slider.max == end
 
 
 @pytest.mark.parametrize("path", ["solver", "R_on", "limits.position"])

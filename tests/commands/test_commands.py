@@ -266,19 +266,24 @@ def test_deadlines_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
         assert json.loads(capfd.readouterr().out)["late_ticks"] == late
 
 
-def test_a_period_with_which_the_robot_swings_is_named(capfd: pytest.CaptureFixture[str]) -> None:
-    """With 4 ms, a drag of 160 mm stays 26 mm away, and more with lower gains. A model has no such lag."""
+def test_settings_with_which_the_robot_swings_are_named(capfd: pytest.CaptureFixture[str]) -> None:
+    """A drag of 160 mm stays 26 mm away with 4 ms, which is refused. With half of M̄ the lag is twice as long,
+    and a run with the papers' period says so. A model has no such lag."""
     for given, words in (
-        (("T_s=0.004",), "T_s = 4 ms is too long for panda: "),
+        (("M_bar_scale=0.4",), "T_s = 1 ms is too long for panda with this M̄: "),
+        (("levels.position.K_p=400",), "K_p of position is too large for panda "),
         (("T_s=0.002",), ""),
         (("T_s=0.004", "controller=osf"), ""),
     ):
         options = [word for each in given for word in ("--set", each)]
         assert main(["run", "panda-hold", *options, "--duration", "0.02"]) == 0
         last = capfd.readouterr().out.strip().splitlines()[-1]
-        assert last.startswith(words) and ("too long" in last) == bool(words)
-    assert main(["run", "panda-hold", "--set", "T_s=0.02", "--duration", "0.02", "--json", "-"]) == 0
-    assert "Choose at most 2.1 ms" in json.loads(capfd.readouterr().out)["period_too_long"]
+        assert last.startswith(words) and ("time-delay estimation lags" in last) == bool(words)
+    assert main(["run", "panda-hold", "--set", "M_bar_scale=0.4", "--duration", "0.02", "--json", "-"]) == 0
+    assert "Choose at most 0.82 ms" in json.loads(capfd.readouterr().out)["warning"]
+    assert main(["run", "panda-hold", "--set", "T_s=0.02", "--duration", "0.02"]) == 2
+    told = capfd.readouterr().err
+    assert "T_s = 20 ms is too long for panda" in told and "Choose at most 2.1 ms" in told
 
 
 @pytest.mark.parametrize("command", COMMANDS)

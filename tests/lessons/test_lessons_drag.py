@@ -11,7 +11,7 @@ import pytest
 from app.__main__ import main
 from lessons.experiments.drag import Motion, dragged, target
 from lessons.scenes.hold import hold_robot
-from robots import load_robot, load_urdf_text
+from robots import Robot, load_robot, load_urdf_text
 
 FIELD = Path(__file__).parents[1] / "robots" / "field"
 
@@ -67,19 +67,33 @@ def test_the_drag_does_not_end_in_the_robots_own_base() -> None:
     assert dragged(blocked).follows
 
 
-def test_a_robot_of_two_tonnes_follows_and_a_small_one_keeps_the_printed_weights() -> None:
-    """In the units of a heavy robot, R = 10 per (N m)^2 would outweigh Q = 200 per (m/s^2)^2."""
+def heavy(length: float) -> Robot:
+    """Returns an arm of two tonnes whose four links have this length, m."""
     parts = ['<link name="l0"/>']
     for k, axis in enumerate(("0 0 1", "0 1 0", "0 1 0", "0 1 0")):
         parts.append(
-            f'<link name="l{k + 1}"><inertial><origin xyz="0.5 0 0"/><mass value="500"/><inertia ixx="20" '
-            f'iyy="50" izz="50" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j{k}" '
-            f'type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="{min(k, 1)} 0 0"/>'
+            f'<link name="l{k + 1}"><inertial><origin xyz="{0.5 * length} 0 0"/><mass value="500"/>'
+            '<inertia ixx="20" iyy="50" izz="50" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>'
+            f'<origin xyz="{length * min(k, 1)} 0 0"/>'
             f'<axis xyz="{axis}"/><limit lower="-2" upper="2" velocity="2" effort="0"/></joint>'
         )
     parts.append('<link name="tool0"/><joint name="at" type="fixed"><parent link="l4"/>')
-    parts.append('<child link="tool0"/><origin xyz="1 0 0"/></joint>')
-    robot = load_urdf_text(f'<robot name="heavy">{"".join(parts)}</robot>')
+    parts.append(f'<child link="tool0"/><origin xyz="{length} 0 0"/></joint>')
+    return load_urdf_text(f'<robot name="heavy">{"".join(parts)}</robot>')
+
+
+def test_a_long_arm_has_the_time_that_its_target_needs() -> None:
+    """The target moves with 0.5 m/s, and needs more than the 2 s of a short drag for 1.05 m. An arm of 6.7 m
+    was 150 mm behind, as its target was."""
+    motion = dragged(heavy(1.75))
+    assert motion.drag > 1.0 and motion.follows and motion.rest, str(motion)
+    assert " after 3.1 s (drag of 1050 mm)" in str(motion) and Motion(0.3).seconds == 2.0
+
+
+def test_a_robot_of_two_tonnes_follows_and_a_small_one_keeps_the_printed_weights() -> None:
+    """In the units of a heavy robot, R = 10 per (N m)^2 would outweigh Q = 200 per (m/s^2)^2."""
+    robot = heavy(1.0)
     motion = dragged(robot)
     assert motion.follows and motion.rest and motion.torque < 0.9, str(motion)
     assert hold_robot(robot).settings.R_on == "acceleration"

@@ -88,28 +88,6 @@ REFUSED: list[Event] = [
 ]
 
 
-@pytest.mark.parametrize(("robot", "controller", "T_s", "swings"), [
-    ("panda", "himpc", 0.004, True),
-    ("panda", "tdeosf", 0.004, True),
-    ("panda", "osf", 0.004, False),
-    ("iiwa14", "himpc", 0.002, False),
-])  # fmt: skip
-def test_a_period_at_which_an_arm_swings_leaves_a_notice(
-    robot: str, controller: str, T_s: float, swings: bool
-) -> None:
-    """With time-delay estimation a long period lags. The notice comes with the change, and a shorter period
-    that brings the arm to rest again leaves none."""
-    session = TorqueSession(torque_scene(f"{robot}-hold"))
-    session.post(Set("controller", controller))
-    session.post(Set("T_s", T_s))
-    session.tick()
-    told = [notice for notice in session.notices if "may swing" in notice]
-    assert len(told) == int(swings) and all(f"T_s = {1e3 * T_s:g} ms" in notice for notice in told)
-    session.post(Set("T_s", 0.001))
-    session.tick()
-    assert [notice for notice in session.notices if "may swing" in notice] == told
-
-
 @pytest.mark.parametrize("event", REFUSED, ids=str)
 def test_a_refused_event_leaves_a_notice_and_changes_nothing(scene: TorqueScene, event: Event) -> None:
     """The learner reads one sentence. Settings, plant and motion are the same as without the event."""

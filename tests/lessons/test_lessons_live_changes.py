@@ -29,7 +29,7 @@ def change_events(scene: TorqueScene) -> dict[str, list[Event]]:
         "R of level 2": Set("levels.2.R", 300),
         "T_s=0.002": Set("T_s", 0.002),
         "T_s=0.0005": Set("T_s", 0.0005),
-        "K_p": Set("levels.1.K_p", 300),
+        "K_p": Set("levels.1.K_p", 200),
         "K_v": Set("levels.2.K_v", 25),
         "torque_scale": Set("limits.torque_scale", 0.8),
         "velocity_scale": Set("limits.velocity_scale", 0.1),

@@ -104,7 +104,7 @@ def test_an_unchanged_composition_is_told_as_before() -> None:
         ([{"task": "position", "name": "7"}], "name of a task"),
         ([{"task": "position", "name": "damping"}], "last level"),
         ([{"task": "position"}, {"task": "posture", "name": "position"}], "twice"),
-        ([{"task": "position", "Q": -1}], "above 0"),
+        ([{"task": "position", "Q": -1}], "from 1e-12"),
         ([{"task": "position", "K_p": "stiff"}], "K_p"),
         ([{"tasks": []}], "as a list"),
         ([7], "as an object"),

@@ -10,7 +10,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from robots import CATALOG, InputError, load_robot, load_urdf_text
+from robots import CATALOG, InputError, Robot, load_robot, load_urdf_text
+from robots.inertia import mass_matrix
 
 
 @pytest.mark.parametrize("name", CATALOG)
@@ -110,3 +111,80 @@ def test_heavy_libraries_stay_behind_their_doors() -> None:
     code = "import sys, robots; print([m for m in ('trimesh', 'viser') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_tool_changes_nothing_but_the_tip() -> None:
+    """Home, M̄, limits and shapes are those of the catalog."""
+    bare, robot = load_robot("panda"), load_robot("panda", "@0,0,0.1")
+    assert robot.collision == bare.collision and robot.cover == bare.cover
+    for name in ("home", "M_bar", "a_max", "tau_limit", "v_limit", "q_lower", "q_upper"):
+        np.testing.assert_array_equal(getattr(robot, name), getattr(bare, name))
+    assert "tool" in robot.frames and set(robot.frames) - {"tool"} == set(bare.frames)
+
+
+@pytest.mark.parametrize(("name", "hold"), [
+    ("panda", "joint[13]"), ("planar3", "joint_2"), ("ridgeback-ur10", "base.*"), ("baxter", "left.*"),
+    ("iiwa14", "joint_7"),
+])  # fmt: skip
+def test_held_joints_leave_the_rest_as_it_is(name: str, hold: str) -> None:
+    """The other joints keep their home, M̄ and deceleration, and all shapes their places at home. M⁻¹M̄ has no
+    larger eigenvalue than without held joints, so M̄ need not be estimated again."""
+    whole, robot = load_robot(name), load_robot(name, hold=(hold,))
+    kept = [whole.joint_names.index(joint) for joint in robot.joint_names]
+    assert 0 < robot.n < whole.n
+    for field in ("home", "M_bar", "a_max", "tau_limit", "v_limit"):
+        np.testing.assert_array_equal(getattr(robot, field), getattr(whole, field)[kept])
+    for shapes in (_at_home, _capsules_at_home):
+        now, before = shapes(robot), shapes(whole)
+        assert now.keys() == before.keys() and before
+        for key, points in before.items():
+            np.testing.assert_allclose(now[key], points, atol=1e-9)
+    largest = [float(np.linalg.eigvalsh(_scaled(each))[-1]) for each in (robot, whole)]
+    assert largest[0] <= largest[1] + 1e-9
+
+
+def test_a_pattern_with_a_value_holds_a_joint_there() -> None:
+    whole, robot = load_robot("panda"), load_robot("panda", hold=("joint4=-3", "joint[67]"))
+    assert "held at -3 rad" in str(robot.report.findings)
+    pairs = {frozenset(pair.names) for pair in robot.collision.excluded}
+    assert pairs >= {frozenset(("link1", "link2")), frozenset(("link2", "link3"))}
+    assert len(robot.collision.solids) == len(whole.collision.solids)
+
+
+def test_a_robot_whose_joints_are_all_held_is_refused() -> None:
+    with pytest.raises(InputError, match="none of its joints moves"):
+        load_robot("planar3", hold=("joint_.*",))
+
+
+def _scaled(robot: Robot) -> np.ndarray:
+    root = np.sqrt(robot.M_bar)
+    M = mass_matrix(robot.model, robot.model.createData(), robot.home)
+    return root[:, None] * np.linalg.inv(M) * root
+
+
+def _placed(robot: Robot, joint: int, points: np.ndarray) -> np.ndarray:
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, robot.home)
+    return np.array([data.oMi[joint].act(point) for point in points])
+
+
+def _at_home(robot: Robot) -> dict[tuple[str, int], np.ndarray]:
+    """Returns three points of each solid's axes and the corners of its hull, in the world, m."""
+    found: dict[tuple[str, int], np.ndarray] = {}
+    for solid in robot.collision.solids:
+        w, x, y, z = solid.quaternion
+        axes = pin.Quaternion(w, x, y, z).toRotationMatrix().T + np.array(solid.position)
+        points = np.array([*axes, *solid.points])
+        number = sum(link == solid.link for link, _ in found)
+        found[solid.link, number] = _placed(robot, solid.joint, points)
+    return found
+
+
+def _capsules_at_home(robot: Robot) -> dict[tuple[str, int], np.ndarray]:
+    """Returns the ends of each capsule in the world, m."""
+    found: dict[tuple[str, int], np.ndarray] = {}
+    assert robot.cover is not None
+    for capsule in robot.cover.capsules:
+        number = sum(link == capsule.link for link, _ in found)
+        found[capsule.link, number] = _placed(robot, capsule.joint, np.array([capsule.start, capsule.end]))
+    return found

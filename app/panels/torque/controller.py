@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from functools import partial
 
-import numpy as np
 import viser
 
 from app.html.palette import BAD, GOOD
@@ -13,10 +14,9 @@ from app.panels.context import PageContext
 from app.panels.inside.spectrum import SpectrumPicture
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
+from lessons.settings.period import USUAL, longest_period
 from lessons.settings.torque import TorqueSettings
-from robots import tracking_bandwidth
-from robots.inertia import SLOW, mass_matrix
-from robots.truth import true_model
+from robots import Robot
 
 _LOOKS = 9
 """Number of updates over which the share of late ticks is computed: about two seconds."""
@@ -58,7 +58,7 @@ class HorizonPanel:
         gui = page.gui
         controls = Controls(gui, page.bindings, page.settings)
         with gui.add_folder("Horizon and inertia estimate M̄", order=1.0):
-            controls.add_group("Horizon", highest={"T_s": _longest_period(page)})
+            controls.add_group("Horizon", ends={"T_s": partial(_longest, page.robot)})
             controls.add_group("Inertia estimate M̄")
             self._gauge = gui.add_html("")
             controls.add_elements("M_bar", joint_labels(page.robot.joint_names), "Per joint, kg·m²")
@@ -78,14 +78,9 @@ class HorizonPanel:
         self._norm.content = _measured("norm ‖I − M⁻¹M̄‖₂", now.number("gauge_norm"))
 
 
-def _longest_period(page: PageContext) -> float:
-    """Returns the control period, ms, at which the bandwidth of time-delay estimation is `SLOW` at home:
-    with a longer one the arm swings, or is too slow to follow. The slider ends there."""
-    settings = page.settings
-    model = true_model(page.robot, settings.plant)
-    M = mass_matrix(model, model.createData(), page.robot.home)
-    bandwidth = tracking_bandwidth(M, np.array(settings.M_bar), 1e-3)
-    return max(1.0, 0.5 * round(2.0 * bandwidth / SLOW))
+def _longest(robot: Robot, settings: TorqueSettings) -> float:
+    """Returns the longest control period that is accepted, ms, in steps of the slider."""
+    return max(1e3 * USUAL, 0.5 * math.floor(2e3 * min(longest_period(robot, settings), 1.0)))
 
 
 def _measured(name: str, value: float) -> str:

@@ -23,7 +23,7 @@ from lessons.teaching.lesson import Control, chosen
 from robots.ranges import Shown
 
 NONE: Mapping[str, str] = MappingProxyType({})
-NO_RANGES: Mapping[str, float] = MappingProxyType({})
+NO_ENDS: Mapping[str, Callable[[Any], float]] = MappingProxyType({})
 STEPS = 200
 """Number of steps of a logarithmic slider."""
 S = TypeVar("S", bound=SceneSettings)
@@ -80,7 +80,7 @@ class Controls(Generic[S]):
         name: str,
         lists: Mapping[str, str] = NONE,
         elements: Sequence[str] = (),
-        highest: Mapping[str, float] = NO_RANGES,
+        ends: Mapping[str, Callable[[S], float]] = NO_ENDS,
     ) -> None:
         """Adds a control for each setting whose description names this group.
 
@@ -88,14 +88,12 @@ class Controls(Generic[S]):
             name: the group.
             lists: titles, by path, of folders with the elements of lists.
             elements: the labels of the elements.
-            highest: ends, by path, of sliders that are shorter than usual.
+            ends: functions, by path, that return the end of a slider, in its page unit, for the settings; it
+                is at most the usual one.
         """
         for setting in self._settings.table().values():
             if setting.shown.group == name:
-                if setting.path in highest:
-                    end = min(setting.shown.high, highest[setting.path])
-                    setting = replace(setting, shown=replace(setting.shown, high=end))
-                self.add_as(setting)
+                self.add_as(setting, end=ends.get(setting.path))
                 if setting.path in lists:
                     self.add_elements(setting.path, elements, lists[setting.path])
 
@@ -104,6 +102,7 @@ class Controls(Generic[S]):
         setting: Setting,
         read: Callable[[S], Any] | None = None,
         make: Callable[[float], Any] | None = None,
+        end: Callable[[S], float] | None = None,
     ) -> None:
         """Adds a control of a setting. Its description may differ from the setting's own.
 
@@ -111,6 +110,7 @@ class Controls(Generic[S]):
             setting: its path must be the path of a setting.
             read: returns the value to show; None: the setting's value is shown.
             make: converts a slider's number to the setting's value; None: the number is the value.
+            end: see `add_group`; None: the slider has its usual end.
         """
         read = setting.read if read is None else read
         with self._gui.add_folder(None):
@@ -119,7 +119,7 @@ class Controls(Generic[S]):
             elif setting.form.kind == WORD:
                 self._menu(setting, read)
             else:
-                self._slider(setting, read, make)
+                self._slider(setting, read, make, end)
 
     def add_elements(self, path: str, names: Sequence[str], title: str) -> None:
         """Adds a folder with a number input for each element of a list; `names` are their labels. The inputs
@@ -146,7 +146,11 @@ class Controls(Generic[S]):
         self._bindings.bind(menu, lambda s: str(read(s)), lambda word: Set(setting.path, str(word)))
 
     def _slider(
-        self, setting: Setting, read: Callable[[S], Any], make: Callable[[float], Any] | None
+        self,
+        setting: Setting,
+        read: Callable[[S], Any],
+        make: Callable[[float], Any] | None,
+        end: Callable[[S], float] | None,
     ) -> None:
         usual = setting.shown
         if usual.log:
@@ -159,10 +163,14 @@ class Controls(Generic[S]):
             return kind(round(scalar(read(settings)) * usual.factor, 9))
 
         now = shown(self._settings)
+
+        def highest(settings: S) -> Any:
+            return max(kind(usual.high if end is None else min(usual.high, end(settings))), now)
+
         slider = self._gui.add_slider(
             usual.title,
             min=min(kind(usual.low), now),
-            max=max(kind(usual.high), now),
+            max=highest(self._settings),
             step=step,
             initial_value=now,
             hint=usual.help or None,
@@ -172,7 +180,12 @@ class Controls(Generic[S]):
             number = kind(value) if usual.factor == 1.0 else float(f"{value / usual.factor:.12g}")
             return Set(setting.path, number if make is None else make(number))
 
-        self._bindings.bind(slider, lambda s: min(max(shown(s), slider.min), slider.max), event)
+        def follow(settings: S) -> Any:
+            if slider.max != highest(settings):
+                slider.max = highest(settings)
+            return min(max(shown(settings), slider.min), slider.max)
+
+        self._bindings.bind(slider, follow, event)
 
     def _logarithmic(self, setting: Setting, read: Callable[[S], Any]) -> None:
         shown = setting.shown
