@@ -15,11 +15,11 @@ The path of a row of telemetry from the tick to the browser:
 1. A tick of the session returns the row; `worker/simulation` writes it into the shared memory of `link/ring`.
 2. The page's thread (`page/page`, 30 Hz) gets the time to show from `client/moment`, which reads the new
    rows.
-3. `client/decimated` keeps the minimum, the maximum and the last value of each column in each interval of
+3. `client/recording` keeps the minimum, the maximum and the last value of each column in each interval of
    time.
 4. `page/layout` gives the moment to `page/torque_ui` or `velocity_ui`, which draws the panels' curves.
 5. viser sends the changes. Data that need not be sent every tick (settings, notices, the progress of a
-   lesson) are sent ten times a second as a `Status` over `link/connection`; `client/simulation` receives
+   lesson) are sent ten times a second as a `Status` over `link/process`; `client/simulation` receives
    them.
 """
 

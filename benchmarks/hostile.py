@@ -30,7 +30,7 @@ import msgspec
 import numpy as np
 from websockets.exceptions import ConnectionClosed
 
-from app.client.decimated import History
+from app.client.recording import History
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.ring import Block

@@ -36,7 +36,7 @@ from app.__main__ import main as himpc_lab
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.panels.widgets.controls import STEPS
-from app.panels.widgets.in_view import AWAKE, LABEL
+from app.tab.in_view import AWAKE, LABEL
 from app.web.server import PageServer
 from benchmarks.child import Child, tell
 from browsing.wire import Wire, eventually

@@ -5,10 +5,10 @@ from __future__ import annotations
 import secrets
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from app.classes.picture import Shape, pose_of, shape_of
 from app.classes.room import Learners, Room, begin
 from app.classes.saved import SavedGathering, restored
 from app.classes.views import View, course, for_all, for_teacher
@@ -16,7 +16,35 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from lessons.replay.state import decode
-from robots import InputError
+from robots import InputError, Robot
+from robots.covering.cover_of import cover_of
+
+Shape = dict[str, Any]
+
+
+def shape_of(robot: Robot) -> Shape:
+    """Returns the capsules of a robot: for each its joint (0 for the base), both ends in the joint's axes,
+    mm, and its radius, mm."""
+    return {
+        "name": robot.name,
+        "capsules": [
+            [each.joint, *(round(1e3 * x) for x in (*each.start, *each.end, each.radius))]
+            for each in cover_of(robot).capsules
+        ],
+    }
+
+
+def pose_of(t: float, poses: np.ndarray) -> Shape:
+    """Returns the simulated time, s, and the poses (J, 7) of joints and tip: position, mm, and quaternion
+    wxyz."""
+    return {
+        "t": round(t, 2),
+        "joints": [
+            [*(round(1e3 * float(x)) for x in each[:3]), *(round(float(x), 3) for x in each[3:])]
+            for each in poses
+        ],
+    }
+
 
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # characters that cannot be confused with each other
 _CODE = 6

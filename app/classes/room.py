@@ -1,4 +1,4 @@
-"""The learners with robots of their own, who follow a class."""
+"""The learners with robots of their own, who follow a class: their pages and the order of their robots."""
 
 from __future__ import annotations
 
@@ -6,17 +6,112 @@ import os
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from typing import Protocol
 
 from app.classes.gathering import Gathering
-from app.classes.queue import BuildQueue
-from app.classes.seats import Seats
+from app.classes.views import View, for_all
 from app.client.simulation_client import SimulationClient
 from app.link.exercise import Lecture, Predict
 from app.link.threads import on_thread
 from robots import InputError
+
+
+class Seats:
+    """Stores, for each learner's page, the function that shows a view and the view that is shown now."""
+
+    def __init__(self, vote: str) -> None:
+        """vote: the page on which watchers vote; "" if learners have robots of their own."""
+        self._vote = vote
+        self._lock = threading.Lock()
+        self._seats: dict[str, tuple[Callable[[View], object], View | None]] = {}
+
+    def sit(self, who: str, show: Callable[[View], object]) -> None:
+        """Shows the class on a learner's page from now on. show: called with the view whenever the view
+        changes."""
+        with self._lock:
+            self._seats[who] = show, None
+
+    def rise(self, who: str) -> None:
+        """Called when a learner's page was closed."""
+        with self._lock:
+            self._seats.pop(who, None)
+
+    def show(self, state: Gathering, before: Mapping[str, int]) -> None:
+        """Updates all pages whose view has changed. before: for each learner who waits for a robot at the
+        class's step, the number of learners before them."""
+        with self._lock:
+            seats = list(self._seats.items())
+        everybody = for_all(state)
+        for who, (show, shown) in seats:
+            member = state.members.get(who)
+            away = member is not None and state.place not in (None, member.at) and who not in before
+            more = {"vote": self._vote, "before": before.get(who)}
+            view = {**everybody, "voted": 0, "away": away, **more}
+            if view == shown:
+                continue
+            try:
+                show(view)
+            except Exception:
+                continue  # the page is being rebuilt, or was closed
+            with self._lock:
+                if who in self._seats and self._seats[who][0] is show:
+                    self._seats[who] = show, view
+
+
+PATIENCE = 10.0
+"""Time, s, after which the next robot no longer waits for a robot that is not ready."""
+
+
+class BuildQueue:
+    """The learners who wait for a robot at the class's step, and those whose robot is being built."""
+
+    def __init__(self, at_once: int) -> None:
+        """at_once: the number of robots that are built at the same time."""
+        self._at_once = at_once
+        self._waiting: list[str] = []
+        self._building: dict[str, float] = {}  # time at which the building began, s
+
+    def clear(self) -> None:
+        """Removes all learners who wait. Learners whose robots are being built for an earlier step of the
+        class remain in the queue, at its start."""
+        self._waiting, self._building = list(self._building), {}
+
+    def enter(self, who: str) -> None:
+        """Adds a learner at the end of the queue."""
+        self._building.pop(who, None)
+        self._waiting.append(who)
+
+    def leave(self, who: str) -> None:
+        """Removes a learner who has left."""
+        self._building.pop(who, None)
+        if who in self._waiting:
+            self._waiting.remove(who)
+
+    def has(self, who: str) -> bool:
+        """Returns whether a learner waits for a robot to be built or to become ready."""
+        return who in self._building or who in self._waiting
+
+    def next(self, ready: Collection[str], now: float) -> list[str]:
+        """Returns the learners whose robots must be built now. ready: the learners whose robots are at the
+        class's step; now: the time, s."""
+        self._building = {
+            who: since for who, since in self._building.items() if who not in ready and now - since < PATIENCE
+        }
+        room = max(0, self._at_once - len(self._building))
+        chosen, self._waiting = self._waiting[:room], self._waiting[room:]
+        self._building |= dict.fromkeys(chosen, now)
+        return chosen
+
+    def before(self) -> dict[str, int]:
+        """Returns, for each learner in the queue, the number of learners before them; 0 while their robot is
+        being built."""
+        return {
+            **dict.fromkeys(self._building, 0),
+            **{who: len(self._building) + k for k, who in enumerate(self._waiting)},
+        }
+
 
 RATE = 5.0
 """Rate at which the learners are checked, Hz."""

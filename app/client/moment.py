@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.client.decimated import PlotWindow
 from app.client.ghost import GhostClient
+from app.client.recording import PlotWindow
 from app.client.simulation import Simulation
 from app.client.simulation_client import SimulationClient
 from app.link.messages import Status

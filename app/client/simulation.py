@@ -10,10 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeVar
 
-from app.client.decimated import History
-from app.client.pose_history import Frame, PoseHistory
-from app.client.rows import RowHistory
-from app.client.run_statistics import RunStatistics
+from app.client.recording import Frame, History, PoseHistory, RowHistory, RunStatistics
 from app.link.fork_server import FIRST_PATIENCE
 from app.link.messages import Command, Loading, LoadRefused, Ready, Report, SimulationFailed, Status
 from app.link.process import Process, Spares

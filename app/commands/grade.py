@@ -1,4 +1,4 @@
-"""`himpc-lab grade`."""
+"""`himpc-lab grade`: exercises, solutions, and the progress that a learner handed in."""
 
 from __future__ import annotations
 
@@ -11,14 +11,118 @@ from typing import TYPE_CHECKING, Literal
 import tyro
 
 from app.commands.autograder import write_autograder
-from app.commands.handed_in import TEXTS, handed_in
-from app.commands.output import print_table, write_json
-from app.commands.own_exercise import check_exercise, print_exercise, print_hints
-from app.commands.progress import progress_bar
+from app.commands.output import print_table, progress_bar, write_json
+from robots import InputError
 from robots.errors import unknown_name
 
 if TYPE_CHECKING:
+    from lessons.exercises.exercise import Exercise
     from lessons.exercises.grade import Grade
+    from lessons.exercises.result import CheckResult
+
+TEXTS = (".txt", ".text", "")
+"""Extensions of files that may contain a learner's progress as text."""
+
+
+def handed_in(file: Path, key: str | None, json: str | None) -> int:
+    """Prints the progress that a learner handed in, and whether a lab with the key signed it."""
+    from app.link.exercise import parts_of
+    from lessons.course import COURSE, load_lesson
+    from lessons.replay.progress import read_handed_in, read_key
+
+    try:
+        if not file.is_file():  # reading a named pipe would wait for ever
+            raise OSError
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        raise InputError(f"{file}: cannot be read as text; give the file that the page exported") from None
+    try:
+        handed, proof = read_handed_in(text, None if key is None else read_key(key))
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    progress = handed.progress
+    lessons = [
+        {
+            "lesson": name,
+            "steps": [place + 1 for place in sorted(progress.seen.get(name, ()))],
+            "of": len(parts_of(load_lesson(name))),
+            "score": progress.best.get(name),
+        }
+        for name in COURSE
+        if name in progress.seen or name in progress.best
+    ]
+    if json is not None:
+        said = {"name": handed.name, "account": handed.account, "at": handed.at, "proof": proof}
+        write_json({**said, "code": handed.code, "lessons": lessons}, json)
+    else:
+        rows = [
+            [str(each["lesson"]), f"{len(each['steps'])} of {each['of']}", _score(each["score"])]
+            for each in lessons
+        ]
+        print_table(f"{handed.name or 'nobody'}, {handed.at}", ("lesson", "steps run", "best score"), rows)
+        print(_SAYS[proof] if key else _NOT_JUDGED)
+        if handed.account:
+            known = key is not None and proof == "signed"
+            print(f"account: {handed.account}" + ("" if known else ", which is not proven"))
+        if handed.code:
+            print(f"setting on the page then: himpc-lab --state {handed.code}")
+    return 0 if key is None or proof == "signed" else 1
+
+
+def _score(points: float | None) -> str:
+    return "–" if points is None else f"{points:.0f}"
+
+
+_SAYS = {
+    "signed": "signed by a lab with your key",
+    "not signed": "not signed: anybody could have written it",
+    "signed with another key": "signed with another key, or changed",
+}
+_NOT_JUDGED = "signature not checked: give the key of your lab with --key FILE"
+
+
+def print_exercise(exercise: Exercise, begin: str, hints: int) -> None:
+    """Prints the card of an exercise, its checks and its first hints; begin: the command that starts it."""
+    card = exercise.card
+    of = f"; belongs to lesson {exercise.lesson}" if exercise.lesson else ""
+    print(f"{exercise.name}: {card.title} ({card.minutes} minutes{of})")
+    print(f"  {card.question}")
+    print(f"  {exercise.plain}")
+    print(f"  begin: {begin}")
+    for check in exercise.checks(0):
+        print(f"    {check.points} points: {check.text} {check.condition}")
+    print_hints(exercise.hints, hints)
+
+
+def print_hints(all_hints: tuple[str, ...], count: int) -> None:
+    for number, hint in enumerate(all_hints[:count], start=1):
+        print(f"hint {number} of {len(all_hints)}: {hint}")
+
+
+def check_exercise(file: Path, seed: int, hints: int, json: str | None) -> int:
+    """Shows and tests the exercise of a teacher's file. Exit code 0: the exercise can be used; 1: the report
+    names errors."""
+    from lessons.exercises.own import exercise_in
+    from lessons.exercises.prove import prove
+    from lessons.parallel import on_cores
+
+    exercise = exercise_in(str(file))
+    if json is None:
+        print_exercise(exercise, f"himpc-lab new controller {exercise.file} --from {file}", hints)
+    with progress_bar(f"grading the solution and the mistakes of {file} …", json is None) as advance:
+        proof = prove(str(file), seed, on_cores, advance)
+    if json is not None:
+        write_json({"name": exercise.name, "faults": list(proof.faults)}, json)
+        return 1 if proof.faults else 0
+    graded = [("the solution", proof.solution), ("the start", proof.start), *proof.mistakes]
+    rows = [[says, f"{grade.points}/{grade.of}", _missed(grade.lines)] for says, grade in graded]
+    print_table(str(file), ("file", "points", "checks that it fails"), rows)
+    print("\n".join(proof.faults) or "the exercise can be used")
+    return 1 if proof.faults else 0
+
+
+def _missed(lines: tuple[CheckResult, ...]) -> str:
+    return ", ".join(str(place) for place, line in enumerate(lines, start=1) if line.why)
 
 
 def grade(

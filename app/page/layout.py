@@ -24,19 +24,15 @@ from app.page.comfort import Comfort
 from app.page.scene_ui import Face
 from app.page.torque_ui import TorqueFace
 from app.page.velocity_ui import VelocityFace
-from app.panels.context import PageContext
-from app.panels.lesson.course import Course
+from app.panels.lesson.step import Course
 from app.panels.run.active_constraints import BindingPanel
 from app.panels.run.compare import ComparePanel
-from app.panels.run.export import ExportPanel
-from app.panels.run.hand_in import add_hand_in
+from app.panels.run.export import ExportPanel, SharePanel, add_hand_in
 from app.panels.run.help import HelpPanel
-from app.panels.run.playback import PlaybackPanel
+from app.panels.run.playback import PlaybackPanel, TimeLine
 from app.panels.run.scene import RobotPanel
-from app.panels.run.share import SharePanel
-from app.panels.run.timeline import TimeLine
 from app.panels.widgets.command import add_command
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView

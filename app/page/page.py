@@ -1,4 +1,5 @@
-"""One browser tab: builds the view and the panels for a learner's session and keeps them up to date."""
+"""One browser tab: builds the view and the panels for a learner's session and keeps them up to date. A lesson
+of the user's own is shown again when its file is saved."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
@@ -24,14 +26,49 @@ from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.link.threads import on_thread
 from app.page.comfort import Comfort
-from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
 from lessons.course import COURSE, heading
+from lessons.own.files import Stamp, is_lesson, stamp
 from lessons.own.folder import Folder
+from robots import InputError
 
 if TYPE_CHECKING:
     from app.page.layout import Stage
     from app.view.recorded import RecordedRun
+
+
+class LessonFile:
+    """Looks at the file whenever the page asks.
+
+    Attributes:
+        fault: what is wrong with the saved version, in one sentence; None if nothing is. The page continues
+            to show the version before.
+    """
+
+    def __init__(self) -> None:
+        self.fault: str | None = None
+        self._stamp: Stamp | None = None
+
+    def saved(self, choice: SceneChoice) -> SceneChoice | None:
+        """Returns the choice with the saved version of its lesson, if there is one that can be used."""
+        place = choice.exercise
+        if place is None or not is_lesson(place.lesson):
+            self.fault = None
+            return None
+        found = stamp(place.lesson)
+        if found is None:
+            return None
+        before, self._stamp = self._stamp, found
+        if before is None or before == found or before[0] != found[0]:
+            return None
+        try:
+            new = choice.at(replace(place, text=None).opened)
+        except InputError as error:
+            self.fault = choice.without_places(f"{error}. The page shows the version before.")
+            return None
+        self.fault = None
+        return None if new.exercise == place else new
+
 
 NARROW = 1000  # px: a narrower window, as in the cell of a notebook, has no room for panels at both sides
 _BROKEN = (

@@ -8,7 +8,7 @@ import viser
 
 from app.client.moment import Moment
 from app.link.messages import Status
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import SessionSnapshot
 from app.view.robot import RobotView
 from lessons.events import Event
 

@@ -8,13 +8,12 @@ from typing import ClassVar
 import numpy as np
 import viser
 
-from app.adapter.removed_handle_errors import unless_removed
+from app.adapter.private import unless_removed
 from app.client.moment import Moment
 from app.html.palette import LEVELS
 from app.link.exercise import signals_of
 from app.link.messages import Status
 from app.page.scene_ui import Tabs
-from app.panels.context import PageContext
 from app.panels.inside.inside import InsidePanel
 from app.panels.run.joints import JointPlots
 from app.panels.run.move import MovePanel
@@ -23,17 +22,17 @@ from app.panels.torque.plant import add_plant
 from app.panels.torque.plots import LevelPlots
 from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from app.view.coordinates import draggable
 from app.view.drag import Hand, TargetFrames, paused_words
 from app.view.drag_target import Movable
 from app.view.ellipsoids import EllipsoidView
 from app.view.pull import Pull
 from app.view.robot import CoverView, LinkPicker, RobotView, gizmo_size
+from app.view.surroundings import ContactView, WorldView
 from app.view.targets import Targets
 from app.view.trails import Trails
 from app.view.turns import JointTurns
-from app.view.world import ContactView, WorldView
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 

@@ -9,12 +9,11 @@ from typing import ClassVar
 import numpy as np
 import viser
 
-from app.adapter.removed_handle_errors import unless_removed
+from app.adapter.private import unless_removed
 from app.client.moment import Moment
 from app.html.text import free_name
 from app.link.messages import Status, TaskView
 from app.page.scene_ui import Tabs
-from app.panels.context import PageContext
 from app.panels.run.joints import ACCELERATION, JointPlots
 from app.panels.run.move import MovePanel
 from app.panels.velocity.controller import HtmpcPanel
@@ -23,7 +22,7 @@ from app.panels.velocity.plant import add_servo_plant
 from app.panels.velocity.plots import TrackingPlots
 from app.panels.velocity.start import BeginPanel, last_ball
 from app.panels.velocity.tasks import RolesPanel
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from app.view.camera import FollowBase
 from app.view.coordinates import full
 from app.view.drag import TargetFrames

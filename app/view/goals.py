@@ -11,8 +11,7 @@ import viser
 from app.client.pending_edit import Send
 from app.html.palette import RGB
 from app.html.text import free_name, quantity
-from app.link.messages import Ready, Status, TaskView
-from app.link.mission_view import MissionRow
+from app.link.messages import MissionRow, Ready, Status, TaskView
 from app.view.drag_target import Gap, Handle, Movable
 from app.view.targets import Targets
 from lessons.events import Event, InsertTask, MoveTarget

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
-from app.client.decimated import PlotWindow
+from app.client.recording import PlotWindow
 
 _BEGIN = 0.05
 """Simulated time, s, until which the robot counts as being at its start."""

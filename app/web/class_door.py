@@ -15,10 +15,9 @@ from websockets.http11 import Request
 from app.classes.hall import Hall
 from app.classes.pages import PageName, page, policy
 from app.classes.sockets import Sockets
-from app.classes.table import table
+from app.classes.views import table
 from app.classes.words import PHONES, TEACHER
-from app.web.answers import NO_CLASS
-from app.web.door import Answer, Door, is_upgrade
+from app.web.door import NO_CLASS, Answer, Door, is_upgrade
 from app.web.passes import QUERY
 from app.web.wrong_codes import WrongCodes
 

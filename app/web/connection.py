@@ -18,9 +18,9 @@ from websockets.http11 import Request
 from app.classes.words import LONGEST
 from app.web import limits
 from app.web.door import Answer
+from app.web.inlet import refusal
 from app.web.limits import TRANSFER, Budget, ConnectionLimits, Uploads
 from app.web.load import PATHS
-from app.web.words import refusal
 
 _FIRST_LINE = re.compile(rb"([A-Z]{1,20}) ([^\s]+) HTTP/1\.([01])(?=\r\n)")
 _READ = ("GET", "HEAD")

@@ -14,9 +14,20 @@ from websockets.http11 import Request, Response
 
 from app.classes.words import PHONES, is_of_a_class
 from app.web import limits
-from app.web.answers import CROWDED, FULL, GUESSED, NO_CLASS, NOT_OPEN, as_response, plain, under_its_name
 from app.web.connection import NOT_ALLOWED, GuardedConnection
-from app.web.door import Answer, Door, is_upgrade
+from app.web.door import (
+    CROWDED,
+    FULL,
+    GUESSED,
+    NO_CLASS,
+    NOT_OPEN,
+    Answer,
+    Door,
+    as_response,
+    is_upgrade,
+    plain,
+    under_its_name,
+)
 from app.web.limits import ConnectionLimits
 from app.web.load import Load, Places, load_of, report
 from app.web.peers import ends_of

@@ -1,13 +1,16 @@
-"""The web server: one page per browser tab, each with its own session."""
+"""The web server: its address, and one page per browser tab, each with its own session."""
 
 from __future__ import annotations
 
+import errno
+import socket
 import threading
 import time
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 import viser
 
@@ -16,23 +19,69 @@ from app.classes.words import TEACHER
 from app.link.choice import SceneChoice
 from app.link.threads import on_thread
 from app.page.page import lay_out, starting
-from app.web.address import LOOPBACK, address_in_use, check_address, local_url, seen_from_outside
-from app.web.classroom import Classroom
 from app.web.door import SELF, Door, as_origin, names_of_this_machine
 from app.web.guard import ConnectionGuard
 from app.web.limits import OF_A_CLASS, ConnectionLimits
 from app.web.malloc_tuning import few_arenas, large_arrays_apart
 from app.web.passes import VARIABLE, Passes, new_key, new_token, shared
-from app.web.sessions import GRACE, Sessions
+from app.web.sessions import GRACE, Classroom, Sessions
 from app.web.visit import FIRST_TEXT, Visit
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
-if TYPE_CHECKING:  # needed for a class only, and loaded late
+if TYPE_CHECKING:
     from app.classes.hall import Hall
     from app.classes.sockets import Sockets
     from app.web.class_file import ClassFile
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+"""Hosts that only this machine can reach."""
+
+
+def check_address(host: str, port: int) -> None:
+    """Raises InputError if no server can listen at this address."""
+    if not 0 <= port <= 65535:
+        raise InputError(f"Port {port} does not exist: give a port from 1024 to 65535.")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            if error.errno == errno.EADDRINUSE:
+                raise address_in_use(host, port) from None
+            reason = error.strerror or str(error)
+            raise InputError(
+                f"Cannot listen on {host}:{port} ({reason}): try --host 127.0.0.1 and another --port."
+            ) from None
+
+
+def address_in_use(host: str, port: int) -> InputError:
+    """Returns the error for a port at which another program listens."""
+    other = port + 1 if port < 65535 else port - 1
+    return InputError(f"Port {port} on {host} is in use: choose another one, e.g. --port {other}.")
+
+
+def local_url(host: str, port: int) -> str:
+    """Returns the address of the server for this machine."""
+    shown = "127.0.0.1" if host == "0.0.0.0" else f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}"
+
+
+def seen_from_outside(host: str, url: str) -> str:
+    """Returns the address of the server for other machines without a proxy. This is the machine's address in
+    its network if the server listens there, else `url`, the address for this machine."""
+    if host not in ("0.0.0.0", "::"):
+        return url
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+        try:
+            line.connect(("192.0.2.1", 9))  # no machine has this address; nothing is sent
+            here = line.getsockname()[0]
+        except OSError:
+            here = socket.gethostname()
+    return f"http://{here}:{urlsplit(url).port}"
+
 
 FIRST = SceneChoice(RunSpec("iiwa14-hold"))
 """The scene that the page shows by default."""
@@ -278,7 +327,7 @@ def _check_choice(choice: SceneChoice) -> None:
     """Checks a choice before the server starts, so that a wrong name or file gives one sentence on the
     terminal. If the names are not enough for the check, the scene is loaded, which takes a second."""
     if not choice.known:
-        from app.worker.reports.start import start
+        from app.worker.simulation import start
 
         start(choice.scene(), choice.run.seed)
 

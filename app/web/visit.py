@@ -15,21 +15,19 @@ import viser
 
 from app.adapter import private
 from app.adapter.names import STORED
-from app.adapter.removed_handle_errors import print_exception, unless_removed
+from app.adapter.private import print_exception, unless_removed
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from app.link.process import why_not
 from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort, window_size
 from app.page.page import Page
-from app.panels.run.class_card import ClassCard
-from app.panels.run.classroom import add_watching
+from app.panels.run.classroom import ClassCard, add_watching
 from app.web import place
-from app.web.classroom import Classroom, Watcher
 from app.web.guard import GuardedConnection
 from app.web.inlet import Inlet
 from app.web.limits import UPLOADS, Uploads
-from app.web.sessions import Sessions, tokens_of
+from app.web.sessions import Classroom, Sessions, Watcher, tokens_of
 from lessons.own.folder import Folder
 from lessons.replay.progress import LearnerProgress, load_progress
 

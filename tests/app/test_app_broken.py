@@ -17,7 +17,7 @@ from app.link.messages import Load
 from app.page.layout import Stage
 from app.page.page import Page
 from app.panels.run.help import HelpPanel
-from app.panels.widgets.in_view import AWAKE, LABEL
+from app.tab.in_view import AWAKE, LABEL
 from browsing.wire import Wire, eventually
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from app.__main__ import main
-from app.classes.newcomers import PER_MINUTE, Newcomers
+from app.classes.sockets import PER_MINUTE, Newcomers
 from app.classes.words import LONGEST, ONLY_HERE
 from app.client.simulation_client import STAYING, SimulationClient
 from app.link.exercise import LessonPlace
@@ -327,7 +327,7 @@ def test_a_flood_of_new_phones_from_one_address_waits(
     assert server.hall is not None
     with phone(server) as one:
         seat = one.told["seat"]
-    monkeypatch.setattr("app.classes.newcomers.PER_MINUTE", 0)
+    monkeypatch.setattr("app.classes.sockets.PER_MINUTE", 0)
     with Line(f"{server.url}/v/{server.hall.code}") as new, Line(f"{server.url}/v/{server.hall.code}") as old:
         new.send(do="hello")
         told = new.hear("say")

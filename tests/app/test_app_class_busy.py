@@ -15,7 +15,7 @@ from served import served
 from test_app_class import LONG
 
 from app.classes.hall import Hall
-from app.classes.queue import PATIENCE, BuildQueue
+from app.classes.room import PATIENCE, BuildQueue
 from app.client import in_class
 from app.client.in_class import Rest
 from app.client.simulation_client import BEHIND, SimulationClient

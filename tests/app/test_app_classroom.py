@@ -16,8 +16,8 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Play
 from app.panels.run.classroom import Guesses
-from app.web.classroom import STEERING, Classroom, Watcher
 from app.web.passes import new_token
+from app.web.sessions import STEERING, Classroom, Watcher
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 

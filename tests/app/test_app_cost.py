@@ -12,7 +12,7 @@ from served import served
 from viser import ClientHandle
 
 from app.adapter import private
-from app.client.decimated import decimate
+from app.client.recording import decimate
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until

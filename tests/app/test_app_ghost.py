@@ -16,10 +16,9 @@ from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.connection import receive, send
 from app.link.exercise import LessonPlace
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
-from app.link.process import wait_until
+from app.link.process import receive, send, wait_until
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually

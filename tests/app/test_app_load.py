@@ -136,7 +136,7 @@ def test_a_code_is_opened_on_a_thread_of_the_page(
         ran.append(threading.current_thread())
         return decode(code)
 
-    monkeypatch.setattr("app.panels.run.share.decode", noted)
+    monkeypatch.setattr("app.panels.run.export.decode", noted)
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     loops: list[threading.Thread] = []
     server._viser.get_event_loop().call_soon_threadsafe(lambda: loops.append(threading.current_thread()))

@@ -12,10 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from app.client.decimated import KEPT, WINDOW, History
-from app.client.pose_history import Frame, PoseHistory
-from app.client.rows import MOST, RowHistory
-from app.client.run_statistics import RunStatistics
+from app.client.recording import KEPT, MOST, WINDOW, Frame, History, PoseHistory, RowHistory, RunStatistics
 from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.view.pull import Grip, pulled, push_at

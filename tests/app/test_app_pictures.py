@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 
 from app.html.palette import LEVELS
-from app.link.inside import Inside, InsideRequest
+from app.link.messages import Inside, InsideRequest
 from app.panels.inside import matrix as hessian
 from app.panels.inside import spectrum
 from app.panels.inside.inside import InsideSubscription

@@ -11,15 +11,14 @@ import numpy as np
 import pytest
 from served import served
 
-from app.client.decimated import History
+from app.client.recording import History
 from app.html.text import free_name
 from app.link.choice import SceneChoice
-from app.link.messages import Play, Post, Ready, ResetAll, Status, StepTicks
-from app.link.mission_view import MissionView
+from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, StepTicks
 from app.panels.velocity.plots import TrackingPlots
 from app.panels.velocity.tasks import RolesPanel
 from app.view.goals import open_row
-from app.worker.pacing import BACKLOG, Pacer
+from app.worker.main import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from himpc import Level

@@ -8,12 +8,11 @@ from dataclasses import replace
 
 from app.client.moment import Moment
 from app.html.text import block
-from app.link.inside import Inside, InsideRequest
-from app.link.messages import Status
-from app.panels.context import PageContext
+from app.link.messages import Inside, InsideRequest, Status
 from app.panels.inside.matrix import MatrixPanel
 from app.panels.inside.plane import PlanePanel
 from app.panels.inside.spectrum import SpectrumPicture
+from app.tab.context import PageContext
 from lessons.settings.torque import TorqueSettings
 
 _AGAIN = 0.4

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from app.html.palette import BAD, BOUND, LEVELS, css, ink
 from app.html.text import block, esc, figure, joint_labels
-from app.link.inside import Inside
-from app.panels.context import PageContext
+from app.link.messages import Inside
 from app.panels.widgets.picture import SvgPicture
+from app.tab.context import PageContext
 
 if TYPE_CHECKING:
     from lessons.geometry.matrix import Matrix

@@ -12,10 +12,10 @@ import numpy as np
 from app.client.moment import Moment
 from app.html.palette import BAD, BOUND, GHOST, RGB, css, ink
 from app.html.text import block, esc, figure, joint_labels, swatch
-from app.link.inside import Inside, InsideRequest
-from app.panels.context import PageContext
+from app.link.messages import Inside, InsideRequest
 from app.panels.widgets.command import on_click
 from app.panels.widgets.picture import SvgPicture
+from app.tab.context import PageContext
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 

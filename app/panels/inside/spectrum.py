@@ -9,9 +9,9 @@ import numpy as np
 import viser
 
 from app.html.palette import BAD, BOUND, GOOD, css
-from app.link.inside import Inside
-from app.panels.widgets.in_view import InView
+from app.link.messages import Inside
 from app.panels.widgets.picture import SvgPicture
+from app.tab.in_view import InView
 
 TITLE = "Eigenvalues of I − M⁻¹M̄"
 SIZE = (360, 208)

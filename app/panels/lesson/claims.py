@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from app.html.glossary import STYLE
-from app.html.markdown import rendered, rendered_line, split, word_count
+from app.html.markdown import STYLE, rendered, rendered_line, split, word_count
 from app.html.palette import BAD, BOUND, GHOST, GOOD, LEVELS, RGB, css, ink, on
 from app.html.text import badge, bar, block, esc, figure, joints_named
 from app.link.exercise import Lecture, LessonPlace, parts_of, signals_of

@@ -1,4 +1,5 @@
-"""The lesson's tab: one step at a time, with its idea, its prediction, its run and the results."""
+"""The lessons in the first tab: one step at a time, with its idea, its prediction, its run and the results;
+and the list of lessons."""
 
 from __future__ import annotations
 
@@ -9,16 +10,17 @@ import viser
 
 from app.client.progress import Notebook
 from app.html.palette import LEVELS, button
+from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, parts_of
 from app.link.messages import Predict, ResetAll, RunStep
 from app.link.threads import on_thread
-from app.panels.context import PageContext
-from app.panels.lesson.cards import belonging_to
+from app.panels.lesson.cards import add_cards, add_invitation, belonging_to, exercise_cards
 from app.panels.lesson.claims import heading, idea, now_you, pictures, state, why
 from app.panels.lesson.prediction import Asking
-from app.panels.widgets.command import add_command, on_click
+from app.panels.widgets.command import PopupWindow, add_command, on_click
 from app.panels.widgets.controls import add_control
-from app.panels.widgets.mirror import Bindings
+from app.tab.context import PageContext
+from app.tab.mirror import Bindings
 from lessons.settings.settings import SceneSettings
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Step
@@ -256,3 +258,50 @@ class LessonPanel:
     def close(self) -> None:
         """Stops all updates before the controls are removed."""
         self._bindings.close()
+
+
+class Course:
+    """The lessons of a page, built anew for every scene. In a lesson the first tab has its step, otherwise a
+    button that leads to the next lesson."""
+
+    def __init__(
+        self,
+        page: PageContext,
+        notebook: Notebook,
+        plots: viser.PanelHandle | viser.GuiTabGroupHandle | None,
+    ) -> None:
+        """plots: gets a tab with the curves of the step. If it
+        is None, the curves are in the panel of the step."""
+        gui, exercise = page.gui, page.learner.choice_of(page.ready).exercise
+        self._page, self._notebook = page, notebook
+        self._list = PopupWindow(gui, "All lessons", "L", self._fill)
+        self._panel: LessonPanel | None = None
+        if exercise is None:
+            add_invitation(gui, notebook, page.choose)
+            on_click(gui.add_button("All lessons", hint="Key L"), self._list.open)
+            return
+        pictures = None
+        if plots is not None:
+            with plots.add_tab("This step"):
+                pictures = gui.add_html("")
+        tab = gui.add_folder(None)
+        self._panel = LessonPanel(page, tab, pictures, exercise, self._list.open, notebook)
+
+    def _fill(self) -> None:
+        add_cards(self._page.gui, self._notebook, self._leave_for)
+        self._page.gui.add_html(exercise_cards())
+
+    def _leave_for(self, choice: SceneChoice) -> None:
+        self._list.close()
+        self._page.choose(choice)
+
+    def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
+        """Updates the progress of the lesson."""
+        if self._panel is not None:
+            self._panel.follow(lecture, settings)
+
+    def close(self) -> None:
+        """Closes the list and the panel before the page removes them."""
+        self._list.close()
+        if self._panel is not None:
+            self._panel.close()

@@ -6,7 +6,7 @@ import viser
 
 from app.html.palette import BOUND, RGB
 from app.html.text import block, esc, joints_named, swatch
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import SessionSnapshot
 from himpc.limits import CONSTRAINTS
 from lessons.settings.settings import SceneSettings
 

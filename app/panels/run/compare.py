@@ -7,12 +7,11 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.run_statistics import RunFigures
+from app.client.recording import RunFigures
 from app.html.palette import BAD, BOUND, GHOST, button, ink
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
-from app.panels.context import PageContext
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from lessons.session.ghost import swapped
 from lessons.settings.presets import usual_settings
 from lessons.settings.settings import SceneSettings

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import viser
 
-from app.html.glossary import words
+from app.html.markdown import words
 from app.html.text import block
-from app.panels.widgets.window import PopupWindow
+from app.panels.widgets.command import PopupWindow
 
 _KEYS = (
     ("Space", "run or pause"),

@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from app.client.decimated import PlotWindow
+from app.client.recording import PlotWindow
 from app.html.palette import BAD, BOUND, GOOD, ink, joint_colour, joint_dash
 from app.html.text import block, joints_named
-from app.panels.context import PageContext
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
+from app.tab.context import PageContext
 from robots import Robot
 from robots.joints import joint_axis
 

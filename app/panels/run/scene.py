@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import viser
 
-from app.adapter.removed_handle_errors import unless_removed
+from app.adapter.private import unless_removed
 from app.html.palette import BAD, DAMPING, GOOD, LEVELS, css
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.link.threads import on_thread
-from app.panels.context import PageContext
 from app.panels.widgets.command import on_click
+from app.tab.context import PageContext
 from lessons.experiments.verdict import verdict
 from lessons.own.files import is_file, is_lesson
 from lessons.own.folder import Folder

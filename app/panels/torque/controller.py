@@ -9,10 +9,9 @@ import viser
 
 from app.html.palette import BAD, GOOD
 from app.html.text import bar, block, esc, formula, joint_labels
-from app.panels.context import PageContext
 from app.panels.inside.spectrum import SpectrumPicture
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 from robots import tracking_bandwidth
 from robots.inertia import SLOW, mass_matrix

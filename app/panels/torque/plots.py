@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.client.decimated import BUCKETS, PlotWindow
+from app.client.recording import BUCKETS, PlotWindow
 from app.html.palette import BAD, BOUND, GOOD, JOINTS, LEVELS
 from app.html.text import block
-from app.panels.context import PageContext
 from app.panels.run.joints import TORQUE, data_sheet, quantities
 from app.panels.widgets.chart import NO_TICK, Chart, ChartLine, of_ghost
+from app.tab.context import PageContext
 from lessons.settings.torque import TorqueSettings
 from robots.collision import Floor
 

@@ -10,10 +10,9 @@ import viser
 from app.html.palette import BAD, BOUND, GOOD, RGB, TARGET, ink
 from app.html.text import block, esc, joint_labels, joints_named, quantity, swatch
 from app.link.messages import TaskView
-from app.panels.context import PageContext
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import in_colours_of_axes
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from app.view.coordinates import draggable
 from app.view.reachability import Reachability
 from himpc.stack import Level

@@ -10,8 +10,8 @@ import viser
 
 from app.html.palette import BAD, RGB, button
 from app.html.text import block, esc, joint_labels
-from app.panels.context import PageContext
-from app.panels.widgets.mirror import Bindings
+from app.tab.context import PageContext
+from app.tab.mirror import Bindings
 from himpc.stack import Stack
 from himpc.tasks import KINDS, Task
 from himpc.tasks.axes import OnAxes

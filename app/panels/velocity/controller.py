@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from app.html.text import block, esc, formula
-from app.panels.context import PageContext
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import base_joints
 from himpc.htmpc.settings import efforts

@@ -8,11 +8,10 @@ import numpy as np
 
 from app.html.palette import GOOD, RGB, button, css
 from app.html.text import badge, block, esc, free_name, swatch
-from app.link.mission_view import MissionRow
-from app.panels.context import PageContext
+from app.link.messages import MissionRow
 from app.panels.widgets.command import on_click
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
 from lessons.settings.missions import ArchitectureOptions
 from lessons.settings.obstacle_missions import PerceptionOptions

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from app.html.text import block
-from app.panels.context import PageContext
 from app.panels.widgets.controls import Controls
+from app.tab.context import PageContext
 
 
 def add_servo_plant(page: PageContext) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.client.decimated import BUCKETS, PlotWindow
+from app.client.recording import BUCKETS, PlotWindow
 from app.html.palette import BOUND, GOOD, JOINTS, LEVELS
 from app.html.text import block
 from app.link.messages import TaskView
-from app.panels.context import PageContext
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
+from app.tab.context import PageContext
 from himpc.htmpc import base_joints
 
 _ERROR = (1e-2, 1e4)  # mm or degrees

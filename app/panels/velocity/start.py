@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping
 import viser
 
 from app.html.text import badge, block, esc, quantity, swatch
-from app.panels.context import PageContext
 from app.panels.velocity.mission import swap
 from app.panels.widgets.command import on_click
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball
 

@@ -8,10 +8,9 @@ import viser
 
 from app.client.pending_edit import PendingEdit
 from app.html.text import block, quantity
-from app.panels.context import PageContext
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.level_row import MORE, OFF, ON, LevelRow
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from himpc.stack import Level
 from lessons.events import Set
 from lessons.settings.velocity import VelocitySettings

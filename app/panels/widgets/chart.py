@@ -11,11 +11,11 @@ import viser
 from viser import uplot
 
 from app.adapter import private
-from app.client.decimated import BUCKETS, WINDOW, PlotWindow, decimate
+from app.client.recording import BUCKETS, WINDOW, PlotWindow, decimate
 from app.html.curves import round_step
 from app.html.palette import RGB, css
 from app.html.text import block
-from app.panels.widgets.in_view import InView
+from app.tab.in_view import InView
 
 _NUDGE = 10
 """Number of updates after which the curves are sent even if they have not changed; the time axis is then

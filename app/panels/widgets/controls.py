@@ -14,7 +14,7 @@ from app.adapter.names import NUMBER_BOX, ROW, SLIDER_LABEL
 from app.adapter.private import dom_id
 from app.html.palette import AXES, css, ink
 from app.html.text import figure
-from app.panels.widgets.mirror import Bindings, scalar
+from app.tab.mirror import Bindings, scalar
 from lessons.events import Set
 from lessons.settings.schema import Setting
 from lessons.settings.settings import SceneSettings

@@ -10,7 +10,7 @@ import viser
 
 from app.adapter import private
 from app.html.text import esc
-from app.panels.widgets.in_view import InView
+from app.tab.in_view import InView
 
 _EVERY = 0.15  # s between two updates: a moving picture needs several kilobytes per second
 _AGAIN = 15

@@ -13,8 +13,8 @@ from served import served
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.web.classroom import STEERING, Classroom
 from app.web.server import PageServer
+from app.web.sessions import STEERING, Classroom
 from browsing.browser_actions import open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 

@@ -12,8 +12,7 @@ from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.inside import InsideRequest
-from app.link.messages import Play, Post
+from app.link.messages import InsideRequest, Play, Post
 from app.panels.inside.matrix import TITLE as HESSIAN
 from app.panels.inside.plane import TITLE as PLANE
 from app.panels.inside.spectrum import TITLE as SPECTRUM

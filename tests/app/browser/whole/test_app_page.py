@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.adapter import private
-from app.adapter.thread_safe_event import ThreadSafeEvent
+from app.adapter.private import ThreadSafeEvent
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load

@@ -1,11 +1,11 @@
-"""What the panels of one scene in one page share."""
+"""What the panels and the 3D view of one scene in one page share."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import viser
@@ -13,11 +13,45 @@ import viser
 from app.client.simulation_client import SimulationClient
 from app.html.palette import RGB
 from app.link.choice import SceneChoice
-from app.link.messages import Command, Post, Ready
-from app.panels.widgets.in_view import InView
-from app.panels.widgets.mirror import Bindings
+from app.link.messages import Command, Post, Ready, Status
+from app.tab.in_view import InView
+from app.tab.mirror import Bindings
 from lessons.events import Event, MoveTarget
+from lessons.settings.settings import SceneSettings
 from robots import Robot
+
+S_co = TypeVar("S_co", bound=SceneSettings, covariant=True)
+
+
+@dataclass(frozen=True, eq=False)
+class SessionSnapshot(Generic[S_co]):
+    """latest: the last telemetry row; bound_seconds: (n, number of constraints), the time, s, that each joint
+    has spent at the bound of each of himpc's `CONSTRAINTS` since the last reset."""
+
+    ready: Ready
+    settings: S_co
+    status: Status
+    latest: np.ndarray
+    bound_seconds: np.ndarray
+
+    def field(self, name: str) -> np.ndarray:
+        """Returns a field of the last row."""
+        return self.latest[self.ready.layout.fields[name]]
+
+    def number(self, name: str) -> float:
+        """Returns a scalar field of the last row; NaN if the layout has no field of this name."""
+        where = self.ready.layout.fields.get(name)
+        return float("nan") if where is None else float(self.latest[where][0])
+
+    def fallback(self, level: str) -> str:
+        """Returns the name of the fallback with which a level was solved at the last row; "" if none was
+        needed or the level was not solved."""
+        code = self.number(f"fallback/{level}")
+        return self.ready.layout.fallbacks[int(code)] if code > 0 else ""
+
+    def error(self, task: str) -> float:
+        """Returns the error norm ‖x̃‖ of a task, m or rad."""
+        return float(np.linalg.norm(self.field(f"error/{task}")))
 
 
 @dataclass(eq=False)

@@ -7,10 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from app.link.inside import Inside, InsideRequest
-from app.link.messages import ContactPoint, TaskView
-from app.link.mission_view import MissionView
-from app.link.own_code import OwnCode
+from app.link.messages import ContactPoint, Inside, InsideRequest, MissionView, OwnCode, TaskView
 from himpc.plan import Binding
 from himpc.tasks import PlaneDistance, Task
 from himpc.tasks.kinds import kind_name

@@ -6,8 +6,8 @@ from typing import final
 
 import numpy as np
 
-from app.link.mission_view import MissionRow, MissionView, Person
-from app.worker.reports.report import SessionReport
+from app.link.messages import MissionRow, MissionView, Person
+from app.worker.report import SessionReport
 from himpc.htmpc import base_joints
 from himpc.missions import Follow, Go, MissionTask
 from himpc.references import Path
@@ -25,7 +25,7 @@ _AROUND = 1.9
 
 @final
 class VelocityRun(SessionReport):
-    """The data of a velocity-level session, see `app.worker.reports.report.SessionReport`.
+    """The data of a velocity-level session, see `app.worker.report.SessionReport`.
 
     Each role has one target: the goal of the role's first open task, (m,) m or (3, 3).
     """

@@ -10,8 +10,7 @@ from typing import Any, Generic, TypeVar
 
 import viser
 
-from app.adapter.private import send_again
-from app.adapter.removed_handle_errors import unless_removed
+from app.adapter.private import send_again, unless_removed
 from app.client.pending_edit import HOLD, Send
 from lessons.events import Event
 

@@ -1,19 +1,95 @@
-"""The last minute of telemetry, reduced for plots. Short peaks are kept, and points that nobody can see are
-left out."""
+"""What a page keeps of a run: the last minute for plots (short peaks are kept, and points that nobody can see
+are left out) and for looking back, exact rows for export, and running sums over all ticks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.link.messages import Status
 from app.link.ring import Block
 
 if TYPE_CHECKING:
     from himpc.telemetry import Layout
+
+FRAMES = 30.0
+"""Number of frames that are stored per simulated second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """t: s; poses: (J, 7), as in `Block`; status: the newest report at that time."""
+
+    t: float
+    poses: np.ndarray
+    status: Status | None
+
+
+class PoseHistory:
+    """Frames in order of time, for at most one minute of simulated time. A reset deletes them."""
+
+    def __init__(self) -> None:
+        self._frames: list[Frame] = []
+
+    def add(self, frame: Frame) -> None:
+        """Adds the newest frame. If the previous frame is closer than 1/FRAMES to the frame before it, the
+        newest frame replaces the previous frame. Thus slow motion needs no more memory."""
+        frames = self._frames
+        if frames and frame.t < frames[-1].t:
+            frames.clear()
+        if len(frames) > 1 and frames[-1].t - frames[-2].t < 1 / FRAMES - 1e-9:
+            frames.pop()
+        frames.append(frame)
+        # The limit is a time, not a number of frames, as a busy machine gives fewer frames per second.
+        del frames[: self._index(frame.t - KEPT)]
+
+    def clear(self) -> None:
+        self._frames.clear()
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Times of the first and the last frame that can be shown, s; (0, 0) if there are none."""
+        if not self._frames:
+            return 0.0, 0.0
+        last = self._frames[-1].t
+        return max(self._frames[0].t, last - KEPT), last
+
+    def at(self, t: float) -> Frame | None:
+        """Returns the frame at time t: poses interpolated between the two nearest frames, with the report of
+        the earlier frame."""
+        if not self._frames:
+            return None
+        k = self._index(t)
+        before = self._frames[max(k - 1, 0)]
+        if k == 0 or k == len(self._frames):
+            return before
+        after = self._frames[k]
+        share = (t - before.t) / (after.t - before.t)
+        return Frame(t, _between(before.poses, after.poses, share), before.status)
+
+    def between(self, start: float, end: float) -> Iterator[Frame]:
+        """Returns the frames from `start` to `end`, s."""
+        return iter(self._frames[self._index(start) : self._index(end)])
+
+    def _index(self, t: float) -> int:
+        return bisect_right(self._frames, t, key=lambda frame: frame.t)
+
+
+def _between(before: np.ndarray, after: np.ndarray, share: float) -> np.ndarray:
+    # q and −q are the same rotation. Frames are close, so linear interpolation is good enough for
+    # quaternions.
+    near = np.where((before[:, 3:] * after[:, 3:]).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    there = np.hstack([after[:, :3], near * after[:, 3:]])
+    found = (1 - share) * before + share * there
+    found[:, 3:] /= np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
+    return found
+
 
 WINDOW = 8.0  # s of simulated time in the plots
 BUCKETS = 160  # number of buckets in a window
@@ -245,3 +321,169 @@ def _straight(curves: np.ndarray, tolerance: float) -> bool:
     """Returns whether all curves are within the tolerance of their chords."""
     first, share = curves[:, :1], np.arange(curves.shape[1]) / max(1, curves.shape[1] - 1)
     return bool((np.abs(curves - first - (curves[:, -1:] - first) * share) <= tolerance).all())
+
+
+@dataclass(frozen=True)
+class RunFigures:
+    """Figures of a run.
+
+    Attributes:
+        seconds: duration of the run, simulated time.
+        rmse: per task, RMS of ‖x̃‖, m or rad.
+        torque_share: largest ratio of a commanded |τ| to its bound; NaN if the controller commands no torque.
+        unsolved: number of QPs without a solution.
+        step_ms, slow_ms: median and 99th percentile of the control step's time, ms, to 3 %.
+    """
+
+    seconds: float
+    rmse: dict[str, float]
+    torque_share: float
+    unsolved: int
+    step_ms: float
+    slow_ms: float
+
+
+_PER_DECADE = 80  # number of bins in the histogram of step times
+_DECADES = 8  # from 1 µs
+
+
+class RunStatistics:
+    """Adds up portions of rows in their order; `clear` begins a new run."""
+
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        self.clear()
+
+    def clear(self) -> None:
+        self._ticks = 0
+        self._squares = {task.name: 0.0 for task in self._layout.tasks}
+        self._known = dict.fromkeys(self._squares, 0)
+        self._share = 0.0
+        self._times = np.zeros(_PER_DECADE * _DECADES, np.int64)
+        self._unsolved = 0
+        self._t = -1.0
+        self._first = 0.0
+
+    def append_rows(self, rows: np.ndarray) -> None:
+        fields = self._layout.fields
+        t = rows[:, fields["t"].start]
+        if t[0] < self._t:
+            self.clear()
+        if self._ticks == 0:
+            self._first = float(t[0])
+        self._t = float(t[-1])
+        self._ticks += len(rows)
+        for name in self._squares:
+            squares = (rows[:, fields[f"error/{name}"]] ** 2).sum(axis=1)
+            known = np.isfinite(squares)
+            self._squares[name] += float(squares[known].sum())
+            self._known[name] += int(known.sum())
+        self._share = max(self._share, self._torque_share(rows))
+        self._unsolved += int(np.nansum(rows[:, fields["unsolved"]]))
+        step = rows[:, fields["step_us"].start]
+        bins = (_PER_DECADE * np.log10(np.maximum(step, 1.0))).astype(np.int64)
+        self._times += np.bincount(np.minimum(bins, len(self._times) - 1), minlength=len(self._times))
+
+    def _torque_share(self, rows: np.ndarray) -> float:
+        fields = self._layout.fields
+        if "tau_lower" not in fields:
+            return 0.0
+        tau = rows[:, fields["tau_demand"]]
+        with np.errstate(all="ignore"):
+            share = np.maximum(tau / rows[:, fields["tau_upper"]], tau / rows[:, fields["tau_lower"]])
+        finite = share[np.isfinite(share)]
+        return float(finite.max()) if finite.size else 0.0
+
+    def result(self) -> RunFigures | None:
+        """Returns the figures so far; None before the first row."""
+        if not self._ticks:
+            return None
+        return RunFigures(
+            seconds=self._t - self._first,
+            rmse={
+                name: float(np.sqrt(total / self._known[name])) if self._known[name] else float("nan")
+                for name, total in self._squares.items()
+            },
+            torque_share=self._share if "tau_lower" in self._layout.fields else float("nan"),
+            unsolved=self._unsolved,
+            step_ms=self._quantile(0.5),
+            slow_ms=self._quantile(0.99),
+        )
+
+    def _quantile(self, share: float) -> float:
+        """Returns the time in ms below which the given share of the control steps stayed."""
+        index = int(np.searchsorted(np.cumsum(self._times), share * self._ticks))
+        return 1e-3 * float(10 ** ((index + 0.5) / _PER_DECADE))
+
+
+RATE = 100.0
+"""Number of rows that are stored per simulated second."""
+MOST = 12_000
+"""Largest number of rows that are stored of a whole run. Of a longer run, every second, fourth, … row is
+stored."""
+
+
+class RowHistory:
+    """The rows since the last reset: the last minute at RATE, and the whole run as densely as MOST allows."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self._t = layout.fields["t"].start
+        # Two blocks are allocated once. A separate array per row would live for minutes among arrays that
+        # live for an instant, and would fragment the memory. The blocks are not filled, as the system
+        # provides a memory page at the first write, and most scenes are shown for less than a minute.
+        self._recent = np.empty((round(KEPT * RATE), layout.size))
+        self._whole = np.empty((MOST, layout.size))
+        self._clear()
+
+    def _clear(self) -> None:
+        self._every = 1
+        self._kept = 0  # number of rows that were stored at RATE
+        self._thinned = 0  # number of rows in `_whole`
+        self._mark = -1
+        self._last = -np.inf
+
+    def under(self, layout: Layout) -> RowHistory:
+        """Returns the same rows in the layout of another stack; the run continues with that stack."""
+        from himpc.telemetry import relaid
+
+        new = RowHistory(layout)
+        for rows, before, count in (
+            (new._recent, self._recent, min(self._kept, len(self._recent))),
+            (new._whole, self._whole, self._thinned),
+        ):
+            rows[:count] = relaid(before[:count], self.layout, layout)
+        new._every, new._kept, new._thinned = self._every, self._kept, self._thinned
+        new._mark, new._last = self._mark, self._last
+        return new
+
+    def take(self, rows: np.ndarray) -> None:
+        """Adds rows in order of time. A time that is earlier than the last one begins a new run."""
+        times = rows[:, self._t]
+        if times[0] < self._last:
+            self._clear()
+        self._last = float(times[-1])
+        marks = np.floor(times * RATE + 1e-6).astype(np.int64)
+        for k in np.flatnonzero(np.diff(marks, prepend=self._mark)):
+            self._keep(rows[k])
+        self._mark = int(marks[-1])
+
+    def _keep(self, row: np.ndarray) -> None:
+        self._recent[self._kept % len(self._recent)] = row
+        if self._kept % self._every == 0:
+            self._whole[self._thinned] = row
+            self._thinned += 1
+            if self._thinned == MOST:
+                self._thinned = (MOST + 1) // 2
+                self._whole[: self._thinned] = self._whole[::2].copy()
+                self._every *= 2
+        self._kept += 1
+
+    def recent(self) -> np.ndarray:
+        """Returns the rows of the last minute, (k, size)."""
+        end = self._kept
+        return self._recent[np.arange(max(0, end - len(self._recent)), end) % len(self._recent)]
+
+    def whole(self) -> np.ndarray:
+        """Returns the rows since the last reset, (k, size)."""
+        return self._whole[: self._thinned].copy()
