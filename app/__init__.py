@@ -17,7 +17,7 @@ The path of a row of telemetry from the tick to the browser:
    rows.
 3. `client/recording` keeps the minimum, the maximum and the last value of each column in each interval of
    time.
-4. `page/layout` gives the moment to `page/torque_ui` or `velocity_ui`, which draws the panels' curves.
+4. `page/scene_view` gives the moment to `page/torque` or `velocity_ui`, which draws the panels' curves.
 5. viser sends the changes. Data that need not be sent every tick (settings, notices, the progress of a
    lesson) are sent ten times a second as a `Status` over `link/process`; `client/simulation` receives
    them.

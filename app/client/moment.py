@@ -49,6 +49,11 @@ class Moment:
     way: np.ndarray
     ghost: GhostState | None
 
+    @property
+    def beside(self) -> PlotWindow | None:
+        """The curves of the ghost; None if there is no ghost."""
+        return None if self.ghost is None else self.ghost.window
+
 
 def moment_of(learner: SimulationClient, past: float | None, curves: bool = True) -> Moment | None:
     """Reads new data and returns the instant that the page shows; None before the first report.

@@ -18,11 +18,7 @@ Tool = Annotated[str | None, tyro.conf.arg(metavar="X,Y,Z[,ROLL,PITCH,YAW]")]
 """The option that adds a tool."""
 
 
-def robots(
-    check: str | None = None,
-    hold: HeldJoints = (),
-    json: str | None = None,
-) -> int:
+def robots(check: str | None = None, hold: HeldJoints = (), json: str | None = None) -> int:
     """List the robots of the catalog, or check a robot's file. The check prints every repair, default value
     and refusal, and how the robot moves: its target is dragged by 15 % of the arm's length and back.
 

@@ -64,8 +64,7 @@ def in_trouble(state: str, sentence: str) -> str:
     """Returns the text that a page shows for a simulation that ended unexpectedly, hangs or takes long."""
     colour = GOOD if state == "PREPARING" else BAD
     return block(
-        f"{badge(state, colour)} {esc(sentence)}",
-        f"border-left:3px solid {css(colour)};margin:0.4em 0",
+        f"{badge(state, colour)} {esc(sentence)}", f"border-left:3px solid {css(colour)};margin:0.4em 0"
     )
 
 

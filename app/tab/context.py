@@ -10,13 +10,15 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import viser
 
+from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.palette import RGB
 from app.link.choice import SceneChoice
-from app.link.messages import Command, Post, Ready, Status
+from app.link.messages import Command, MissionRow, Post, Ready, Status
 from app.tab.in_view import InView
 from app.tab.mirror import Bindings
 from lessons.events import Event, MoveTarget
+from lessons.own.folder import Folder
 from lessons.settings.settings import SceneSettings
 from robots import Robot
 
@@ -56,7 +58,8 @@ class SessionSnapshot(Generic[S_co]):
 
 @dataclass(eq=False)
 class PageContext:
-    """The one object that panels are handed, instead of a callback for each thing that they do.
+    """The one object that panels and the 3D view are handed, instead of a callback for each thing that they
+    do.
 
     Attributes:
         client: the browser.
@@ -67,8 +70,11 @@ class PageContext:
         dark: whether the page opened with the dark theme.
         choose: loads another scene or step.
         theme: called with True for the dark theme and with False for the light theme.
+        own_files: the folder whose files this page may name; None if it may name no files.
+        notebook: the learner's progress.
         in_view: the charts that the browser shows.
         bindings: for controls of settings that exist in every stack.
+        dragged: whether a target of this scene was dragged.
     """
 
     client: viser.ClientHandle
@@ -79,8 +85,11 @@ class PageContext:
     dark: bool
     choose: Callable[[SceneChoice], None]
     theme: Callable[[bool], None]
+    own_files: Folder | None
+    notebook: Notebook
     in_view: InView = field(init=False)
     bindings: Bindings[Any] = field(init=False)
+    dragged: bool = False
 
     def __post_init__(self) -> None:
         self.in_view, self.bindings = InView(self.client), Bindings(self.post, self.loop)
@@ -101,6 +110,12 @@ class PageContext:
     @property
     def in_lesson(self) -> bool:
         return self.ready.choice.exercise is not None
+
+    @property
+    def mission_rows(self) -> tuple[MissionRow, ...] | None:
+        """The tasks of the mission; None if the scene has no mission, or before the first report."""
+        status = self.learner.status
+        return None if status is None or status.mission is None else status.mission.rows
 
     def post(self, event: Event, *also: MoveTarget) -> None:
         """Puts an event into the session's mailbox, with targets that take effect at the same tick."""

@@ -52,10 +52,7 @@ class Bindings(Generic[S]):
         self._closed = False
 
     def bind(
-        self,
-        handle: viser.GuiInputHandle[Any],
-        read: Callable[[S], Any],
-        event: Callable[[Any], Event],
+        self, handle: viser.GuiInputHandle[Any], read: Callable[[S], Any], event: Callable[[Any], Event]
     ) -> None:
         """Binds a control. `read` returns the control's value for a state of the session, and `event` returns
         the event for a new value."""

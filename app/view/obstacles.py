@@ -12,7 +12,7 @@ import viser
 import viser.transforms as vtf
 
 from app.html.palette import RGB
-from app.view.drag_target import Handle
+from app.view.targets import Handle, put
 from robots.collision import Ball, Box, Floor, Obstacle
 
 _COLOUR: RGB = (180, 120, 110)
@@ -82,7 +82,6 @@ class _Solid:
                 cast_shadow=False,
             )
             size = obstacle.radius
-        self._name, self._moved = obstacle.name, moved
         self._handle = Handle(
             scene,
             f"/obstacle_arrows/{index}",
@@ -92,26 +91,23 @@ class _Solid:
             disable_sliders=True,
             line_width=2.0,
         )
-        self._arrows = self._handle.control
-        self._handle.listen(self._dragged)
 
-    def _dragged(self) -> None:
-        x, y, z = (float(value) for value in self._arrows.position)
-        self._body.position = (x, y, z)
-        self._moved(self._name, (x, y, z))
+        def dragged() -> None:
+            x, y, z = self._handle.position.tolist()
+            self._body.position = (x, y, z)
+            moved(obstacle.name, (x, y, z))
+
+        self._handle.listen(dragged)
 
     def follow(self, obstacle: Ball | Box, arrows: bool) -> None:
-        if self._arrows.visible != arrows:
-            self._arrows.visible = arrows
-        if self._handle.held:
-            return
-        for handle in (self._body, self._arrows):
-            if not np.allclose(obstacle.centre, handle.position, rtol=0.0, atol=1e-4):
-                handle.position = obstacle.centre
+        self._handle.control.visible = arrows
+        if not self._handle.held:
+            put(self._body, obstacle.centre)
+            put(self._handle.control, obstacle.centre)
 
     def remove(self) -> None:
         self._body.remove()
-        self._arrows.remove()
+        self._handle.control.remove()
 
 
 class ReportedObstacles:

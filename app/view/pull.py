@@ -129,8 +129,5 @@ def push_at(
     centre = pose[:3] + vtf.SO3(pose[3:]).as_matrix() @ lever
     torque = np.cross(point - centre, force)
     return Push(
-        robot.model.names[joint],
-        tuple(float(x) for x in force),
-        tuple(float(x) for x in torque),
-        _HELD,
+        robot.model.names[joint], tuple(float(x) for x in force), tuple(float(x) for x in torque), _HELD
     )

@@ -77,8 +77,7 @@ class Carried:
 
     def follow(self, tip: np.ndarray, carried: bool) -> None:
         """tip (3,): the position of the hand, m."""
-        if self._ball.visible != carried:
-            self._ball.visible = carried
+        self._ball.visible = carried
         if carried and not np.allclose(tip, self._ball.position, rtol=0.0, atol=1e-4):
             self._ball.position = tip
 
@@ -98,8 +97,7 @@ class ReachCircle:
         )
 
     def show(self, on: bool) -> None:
-        if self._circle.visible != on:
-            self._circle.visible = on
+        self._circle.visible = on
 
 
 _STATIC: RGB = (160, 150, 140)

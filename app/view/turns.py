@@ -31,14 +31,12 @@ class JointTurns:
             self._start = _start_of(window)
         start = self._start if np.isfinite(q).all() else None
         for k, label in enumerate(self._labels):
-            if label.visible != (start is not None):
-                label.visible = start is not None
+            label.visible = start is not None
             if start is None:
                 continue
             turn = abs(np.degrees(q[k] - start[k]))
             text = f"{k + 1}: {turn:.{0 if turn >= 10 else 1}f}°"
-            if label.text != text:
-                label.text = text
+            label.text = text
             label.position = tuple(poses[self._joints[k] - 1, :3])
 
 

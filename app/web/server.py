@@ -335,7 +335,7 @@ def _check_choice(choice: SceneChoice) -> None:
 def _load_on_thread(choice: SceneChoice) -> None:
     """Loads the data of pages while the first page connects: the panels, then the meshes, whose
     simplification takes some time."""
-    import_module("app.page.layout")
+    import_module("app.page.scene_view")
     from robots.shapes.link_shapes import link_shapes
 
     link_shapes(choice.scene().robot)

@@ -16,10 +16,8 @@ import viser
 from viser import _messages
 
 from app.client.pending_edit import PendingEdit
-from app.panels.torque.controller import ControllerPanel, HorizonPanel
-from app.panels.torque.plant import add_plant
-from app.panels.velocity.controller import HtmpcPanel
-from app.panels.velocity.plant import add_servo_plant
+from app.panels.torque.controller import ControllerPanel, HorizonPanel, add_plant
+from app.panels.velocity.controller import HtmpcPanel, add_servo_plant
 from app.panels.widgets.command import PopupWindow
 from app.tab import mirror as bind
 from app.tab.mirror import Bindings

@@ -10,7 +10,7 @@ import pytest
 
 from app.link.choice import SceneChoice
 from app.link.messages import ContactPoint, Post
-from app.panels.torque.plots import touching
+from app.panels.run.plots import touching
 from app.view.robot import CoverView
 from app.view.surroundings import ContactView, WorldView
 from app.worker.simulation import SimulationRunner

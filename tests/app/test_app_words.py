@@ -266,7 +266,8 @@ def test_poses_of_another_scene_are_none_of_this_page(monkeypatch: pytest.Monkey
     ready = SimpleNamespace(robot=robot)
     mock = MagicMock()
     monkeypatch.setattr("app.tab.context.InView", mock)  # it sends a script to the browser
-    page = PageContext(mock, learner, ready, {}, mock, False, mock, mock)  # pyright: ignore[reportArgumentType]
+    made: Any = (mock, learner, ready, {}, mock, False, mock, mock, None, mock)
+    page = PageContext(*made)
     assert page.poses() is None
     assert page.poses_or_still().shape == (robot.n + 1, 7)
     learner.ready = ready

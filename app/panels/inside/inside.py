@@ -39,11 +39,7 @@ class InsideSubscription:
 class InsidePanel:
     """The tab *Inside*. It requests only the data of pictures that the browser shows."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        spectrum: SpectrumPicture,
-    ) -> None:
+    def __init__(self, page: PageContext, spectrum: SpectrumPicture) -> None:
         """spectrum: the picture beside the controls of M̄."""
         gui, levels = page.gui, tuple(dict.fromkeys(task.level for task in page.ready.tasks))
         self._plane: PlanePanel | None = None

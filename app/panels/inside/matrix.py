@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.html.palette import BAD, BOUND, LEVELS, css, ink
+from app.html.svg import element, path, text
 from app.html.text import block, esc, figure, joint_labels
 from app.link.messages import Inside
 from app.panels.widgets.picture import SvgPicture
@@ -48,8 +49,7 @@ class MatrixPanel:
         if inside is None or not self._picture.in_view:
             return
         words = block(esc(inside.why_not)) if inside.matrix is None else _legend(inside.matrix, self._names)
-        if self._words.content != words:
-            self._words.content = words
+        self._words.content = words
 
 
 def markup(matrix: Matrix, names: Sequence[str]) -> str:
@@ -68,26 +68,23 @@ def markup(matrix: Matrix, names: Sequence[str]) -> str:
                 paths.setdefault(step, []).append(f"M{x:.1f} {y:.1f}h{wide:.1f}v{cell:.1f}h{-wide:.1f}Z")
             start = column
     parts = [
-        f'<path d="{"".join(pieces)}" fill="{css(LEVELS[int(step > 0)], abs(step) / _SHADES)}"/>'
+        path("".join(pieces), fill=css(LEVELS[int(step > 0)], abs(step) / _SHADES))
         for step, pieces in sorted(paths.items())
     ]
-    frame = (
-        f'<rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}" fill="none" stroke="{css(BOUND)}"/>'
-    )
     lines = "".join(
         f"M{_LEFT + at:.1f} {_TOP}v{_SIDE}M{_LEFT} {_TOP + at:.1f}h{_SIDE}"
         for at in (knot * matrix.joints * cell for knot in range(1, matrix.shown))
     )
-    parts += [frame, f'<path d="{lines}" stroke="{css(BOUND, 0.7)}"/>', _labels(matrix, names, cell)]
+    square: dict[str, Any] = {"x": _LEFT, "y": _TOP, "width": _SIDE, "height": _SIDE}
+    parts.append(element("rect", **square, fill="none", stroke=css(BOUND)))
+    parts += [path(lines, stroke=css(BOUND, 0.7)), _labels(matrix, names, cell)]
     for active in {(each.knot, each.joint) for each in matrix.active if each.knot < matrix.shown}:
         at = _TOP + (active[0] * matrix.joints + active[1] + 0.5) * cell
         x = _LEFT + at - _TOP
-        parts.append(
-            f'<g class="active" fill="{css(BAD)}"><path d="M{_LEFT - 1} {at:.1f}l-8 -4v8Z"/>'
-            f'<path d="M{x:.1f} {_TOP + _SIDE + 1}l-4 8h8Z"/></g>'
-            f'<path d="M{_LEFT} {at:.1f}h{_SIDE}M{x:.1f} {_TOP}v{_SIDE}" stroke="{css(BAD)}" '
-            'stroke-width="0.8"/>'
-        )
+        arrows = path(f"M{_LEFT - 1} {at:.1f}l-8 -4v8Z") + path(f"M{x:.1f} {_TOP + _SIDE + 1}l-4 8h8Z")
+        parts.append(element("g", arrows, class_="active", fill=css(BAD)))
+        cross = f"M{_LEFT} {at:.1f}h{_SIDE}M{x:.1f} {_TOP}v{_SIDE}"
+        parts.append(path(cross, stroke=css(BAD), stroke_width=0.8))
     return "".join(parts)
 
 
@@ -98,26 +95,18 @@ def _step(shade: int) -> int:
 
 def _labels(matrix: Matrix, names: Sequence[str], cell: float) -> str:
     """Labels of the rows and columns: the joints if only one knot is shown, otherwise the knots."""
-    parts = []
     if matrix.shown == 1:
-        for joint, name in enumerate(names):
-            at = (joint + 0.5) * cell
-            short = esc(name if len(name) <= 8 else f"{joint + 1}")
-            parts.append(f'<text x="{_LEFT - 12}" y="{_TOP + at + 4:.1f}" text-anchor="end">{short}</text>')
-            parts.append(
-                f'<text x="{_LEFT + at:.1f}" y="{_TOP + _SIDE + 21}" text-anchor="middle">{short}</text>'
-            )
+        size, words = cell, "joint by joint"
+        short = [name if len(name) <= 8 else f"{joint + 1}" for joint, name in enumerate(names)]
+        labels = [(name, name) for name in short]
     else:
-        for knot in range(matrix.shown):
-            at = (knot + 0.5) * matrix.joints * cell
-            parts.append(
-                f'<text x="{_LEFT - 12}" y="{_TOP + at + 4:.1f}" text-anchor="end">Δτ, {knot}</text>'
-                f'<text x="{_LEFT + at:.1f}" y="{_TOP + _SIDE + 21}" text-anchor="middle">{knot}</text>'
-            )
-    words = "joint by joint" if matrix.shown == 1 else "knot by knot, and for each knot joint by joint"
-    parts.append(
-        f'<text x="{_LEFT + 0.5 * _SIDE}" y="{_TOP + _SIDE + 37}" text-anchor="middle">Δτ, {words}</text>'
-    )
+        size, words = matrix.joints * cell, "knot by knot, and for each knot joint by joint"
+        labels = [(f"Δτ, {knot}", f"{knot}") for knot in range(matrix.shown)]
+    parts = [text(_LEFT + 0.5 * _SIDE, _TOP + _SIDE + 37, f"Δτ, {words}", "middle")]
+    for k, (left, below) in enumerate(labels):
+        at = (k + 0.5) * size
+        parts.append(text(_LEFT - 12, _TOP + at + 4, left, "end"))
+        parts.append(text(_LEFT + at, _TOP + _SIDE + 21, below, "middle"))
     return "".join(parts)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import viser
 
 from app.html.palette import BAD, BOUND, GOOD, css
+from app.html.svg import element, path, text
 from app.link.messages import Inside
 from app.panels.widgets.picture import SvgPicture
 from app.tab.in_view import InView
@@ -41,32 +42,34 @@ def markup(values: np.ndarray | Sequence[float]) -> str:
     """Returns SVG with a mark for each eigenvalue; all eigenvalues are real. Marks outside the picture are
     drawn at its edge. The attribute data-at contains the value."""
     x0, y0 = _MIDDLE
-    ring = f'<circle cx="{x0}" cy="{y0}" r="{_RADIUS}" fill="{css(GOOD, 0.08)}" stroke="{css(BOUND)}"/>'
     far, high = _EDGE * _RADIUS, _RADIUS + 8
     axes = f"M{x0 - far:.0f} {y0}H{x0 + far:.0f}M{x0} {y0 - high}v{2 * high}"
-    parts = [ring, f'<path d="{axes}" stroke="{css(BOUND, 0.6)}"/>']
-    for value, words in ((-1.0, "−1"), (1.0, "1")):
-        side = 5 if value > 0 else -5
-        anchor = "start" if value > 0 else "end"
-        parts.append(
-            f'<text x="{x0 + value * _RADIUS + side}" y="{y0 + 14}" text-anchor="{anchor}">{words}</text>'
+    parts = [
+        element("circle", cx=x0, cy=y0, r=_RADIUS, fill=css(GOOD, 0.08), stroke=css(BOUND)),
+        path(axes, stroke=css(BOUND, 0.6)),
+        text(x0 - _RADIUS - 5, y0 + 14, "−1", "end"),
+        text(x0 + _RADIUS + 5, y0 + 14, "1"),
+        text(x0 - 4, y0 + 14, "0", "end"),
+    ]
+    known = [float(value) for value in values if math.isfinite(value)]
+    parts += [
+        element(
+            "circle",
+            class_="eigenvalue",
+            data_at=f"{value:.6g}",
+            cx=x0 + _RADIUS * min(max(value, -_EDGE), _EDGE),
+            cy=y0,
+            r=4.5,
+            fill=css(GOOD if abs(value) < 1.0 else BAD, 0.75),
+            stroke="currentColor",
+            stroke_width=0.7,
         )
-    parts.append(f'<text x="{x0 - 4}" y="{y0 + 14}" text-anchor="end">0</text>')
-    for value in values:
-        if not math.isfinite(value):
-            continue
-        inside = abs(value) < 1.0
-        x = x0 + _RADIUS * min(max(float(value), -_EDGE), _EDGE)
-        parts.append(
-            f'<circle class="eigenvalue" data-at="{value:.6g}" cx="{x:.1f}" cy="{y0}" r="4.5" '
-            f'fill="{css(GOOD if inside else BAD, 0.75)}" stroke="currentColor" stroke-width="0.7"/>'
-        )
-    worst = max((float(value) for value in values if math.isfinite(value)), key=abs, default=math.nan)
-    parts.append(
-        f'<text x="{x0}" y="{SIZE[1] - 18}" text-anchor="middle" font-weight="600">{_verdict(worst)}</text>'
-        f'<text x="{x0}" y="{SIZE[1] - 4}" text-anchor="middle">'
-        "Each tick multiplies each part of the error by its eigenvalue.</text>"
-    )
+        for value in known
+    ]
+    verdict = _verdict(max(known, key=abs, default=math.nan))
+    parts.append(text(x0, SIZE[1] - 18, verdict, "middle", font_weight=600))
+    says = "Each tick multiplies each part of the error by its eigenvalue."
+    parts.append(text(x0, SIZE[1] - 4, says, "middle"))
     return "".join(parts)
 
 

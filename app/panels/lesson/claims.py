@@ -11,17 +11,7 @@ from app.html.text import badge, bar, block, esc, figure, joints_named
 from app.link.exercise import Lecture, LessonPlace, parts_of, signals_of
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart
 from lessons.course import COURSE
-from lessons.events import (
-    Appear,
-    InsertTask,
-    MoveLevel,
-    MoveTarget,
-    Push,
-    Release,
-    RemoveTask,
-    Reset,
-    Set,
-)
+from lessons.events import Appear, InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Script

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import viser
-
-from app.html.palette import BOUND, RGB
+from app.html.palette import BOUND
 from app.html.text import block, esc, joints_named, swatch
-from app.tab.context import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from himpc.limits import CONSTRAINTS
 from lessons.settings.settings import SceneSettings
 
@@ -19,8 +17,8 @@ _HEAD = '<tr style="text-align:left">{}</tr>'
 class BindingPanel:
     """Two tables: the active constraints, and the time at bounds."""
 
-    def __init__(self, gui: viser.GuiApi, colours: dict[str, RGB]) -> None:
-        self._colours = colours
+    def __init__(self, page: PageContext) -> None:
+        gui, self._colours = page.gui, page.colours
         gui.add_html(
             block("A bound <b>binds</b> (is active) when the plan stops at it. The multiplier is the rate at "
                   "which the level's cost would fall if the bound were moved outwards. For costs without the "

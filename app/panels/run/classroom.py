@@ -106,8 +106,7 @@ class ClassCard:
         own robot; `before`: number of learners who get their robot earlier, None if this page has its
         robot."""
         self._text.content = _html(view)
-        if self._back.visible != view["away"]:
-            self._back.visible = view["away"]
+        self._back.visible = view["away"]
 
 
 def _html(view: Mapping[str, Any]) -> str:

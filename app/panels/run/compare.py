@@ -27,10 +27,7 @@ class ComparePanel:
     """The panel of the ghost. Callbacks only start and end ghosts; the state is read from the
     learner's simulation, so that a ghost that a lesson started is also shown."""
 
-    def __init__(
-        self,
-        page: PageContext,
-    ) -> None:
+    def __init__(self, page: PageContext) -> None:
         gui, learner, settings = page.gui, page.learner, page.settings
         self._learner, self._colours = learner, page.colours
         self._choices = {each.shown.name: each for each in usual_settings(settings)}
@@ -116,9 +113,8 @@ class ComparePanel:
         """Shows the state of the ghost, and the results of both runs."""
         ghost = self._learner.ghost
         on = ghost is not None
-        if self._end.visible != on:
-            self._end.visible = self._swap.visible = self._table.visible = on
-            self._start.label = "Start again with these" if on else "Start the ghost"
+        self._end.visible = self._swap.visible = self._table.visible = on
+        self._start.label = "Start again with these" if on else "Start the ghost"
         if ghost is None:
             return
         mine = None if self._learner.score is None else self._learner.score.result()

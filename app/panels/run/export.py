@@ -11,10 +11,8 @@ from pathlib import Path
 import numpy as np
 import viser
 
-from app.client.progress import Notebook
 from app.client.recording import RATE
 from app.client.simulation import Simulation
-from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.messages import RunDescription
@@ -116,9 +114,10 @@ _DOWNLOAD = block(
 )
 
 
-def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook) -> None:
+def add_hand_in(page: PageContext) -> None:
     """Adds the folder with which learners hand in their progress. The text to hand in is written when the
     learner asks for it, on one of viser's threads."""
+    gui, learner, notebook = page.gui, page.learner, page.notebook
     with gui.add_folder("Hand in your progress", expand_by_default=False):
         told = f" The text names your account, <b>{escape(notebook.account)}</b>." if notebook.account else ""
         gui.add_html(block((_SIGNED if notebook.signs else _NOT_SIGNED) + told))

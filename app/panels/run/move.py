@@ -11,7 +11,7 @@ import viser
 from app.client.pending_edit import HOLD
 from app.panels.widgets.command import on_click
 from app.panels.widgets.controls import in_colours_of_axes
-from app.view.drag_target import Movable
+from app.view.targets import Movable
 
 _STEPS = {"1 mm": 1e-3, "1 cm": 1e-2, "5 cm": 5e-2}
 _FIRST = "1 cm"
@@ -91,11 +91,9 @@ class MovePanel:
         at = None if chosen is None else chosen.place()
         movable = chosen is not None and chosen.move is not None
         turns = chosen is not None and chosen.turn is not None
-        if self._turn.visible != turns:
-            self._turn.visible = turns
+        self._turn.visible = turns
         for field, value in zip(self._fields, np.zeros(3) if at is None else at, strict=True):
-            if field.visible != movable:
-                field.visible = movable
+            field.visible = movable
             shown = round(float(value), _DIGITS)
             # A field that was just used keeps its value, even if the robot's reach limits the target.
             if at is not None and time.monotonic() - self._touched > HOLD and field.value != shown:

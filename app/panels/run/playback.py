@@ -31,12 +31,7 @@ _KEPT = 0.9
 class PlaybackPanel:
     """Buttons and a status line."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        fastest: float,
-        brief: bool,
-    ) -> None:
+    def __init__(self, page: PageContext, fastest: float, brief: bool) -> None:
         """fastest: the highest selectable speed, simulated seconds per second; brief: whether the controls
         that a lesson does not need are folded."""
         gui, self._learner, self._loop = page.gui, page.learner, page.loop
@@ -121,8 +116,7 @@ class PlaybackPanel:
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         status = now.status
         choices = self._choices(status.running)
-        if self._buttons.options != choices:
-            self._buttons.options = choices
+        self._buttons.options = choices
         self._loop.call_soon_threadsafe(unless_removed, self._show_speed, status.speed)
         self._status.content = headline(status, now.settings.T_s)
 
@@ -232,12 +226,10 @@ class TimeLine:
     def _say(self) -> None:
         past, at = self.past, self._paused_at
         looking = past is not None and at is not None
-        if self._live.visible != looking:
-            self._live.visible = self._words.visible = looking
+        self._live.visible = self._words.visible = looking
         if past is not None and at is not None:
             text = block(f"<b>Looking back</b>: t = {past:.2f} s, {at - past:.2f} s before the pause")
-            if self._words.content != text:
-                self._words.content = text
+            self._words.content = text
 
     def close(self) -> None:
         self._closed = True

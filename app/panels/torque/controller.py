@@ -98,6 +98,17 @@ def _verdict(value: float) -> str:
     return "" if value != value else " &lt; 1 ✓" if value < 1 else " ≥ 1"
 
 
+def add_plant(page: PageContext) -> None:
+    """Adds the controls of the true plant's settings. The controller does not know them."""
+    page.gui.add_html(
+        block("These are the true values of the simulated robot. The controller does not know them.")
+    )
+    # One factor per link, named by the joint that moves the link.
+    links = {"plant.mass_scale": "Mass of each link", "plant.inertia_scale": "Inertia of each link"}
+    controls = Controls(page.gui, page.bindings, page.settings)
+    controls.add_group("Plant", links, joint_labels(page.robot.joint_names))
+
+
 class DeadlineFolder:
     """Two sliders, and a line with the share of late ticks."""
 

@@ -10,11 +10,11 @@ import viser
 from numpy.typing import NDArray
 
 from app.client.pending_edit import PendingEdit
-from app.html.palette import BOUND, DAMPING
+from app.html.palette import DAMPING
 from app.html.text import block, esc, formula, joints_named, swatch
 from app.panels.torque.task_editor import AddTask, TaskEditor
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.level_row import DOWN, MORE, OFF, ON, UP, LevelRow, error_in_words
+from app.panels.widgets.level_row import DOWN, MORE, UP, LevelRow, error_in_words
 from app.tab.context import PageContext, SessionSnapshot
 from app.tab.mirror import Bindings
 from himpc.stack import Level
@@ -31,73 +31,6 @@ _TURN, _WAY = np.pi, 2.0
 """Range of a slider on both sides of zero for a joint without limits, rad and m."""
 
 
-class LevelCard:
-    """The row of one level, with its settings; over the scene the same row without settings."""
-
-    def __init__(
-        self,
-        page: PageContext,
-        bindings: Bindings[TorqueSettings],
-        level: Level,
-        place: int,
-        targets: Callable[[], Targets],
-        moves: Bindings[Targets],
-        press: Callable[[str, str], None],
-        opened: bool,
-        unfolded: bool,
-        strip: viser.GuiFolderHandle | None,
-    ) -> None:
-        """bindings: for the controls of this stack; targets: returns the present targets, which `moves`
-        shows; press: called with the name of the level
-        and the button that was pressed; opened: whether its settings are open; unfolded: whether the controls
-        that edit the tasks are unfolded; strip: the place over the scene."""
-        gui, robot, settings = page.gui, page.robot, page.settings
-        name = self.name = level.name
-        hint = f"On or off: key {place + 1}. ▲ ▼: priority"
-        colour, buttons = page.colours.get(name, BOUND), (ON if level.enabled else OFF, UP, DOWN)
-        settings_hint = f"{hint}. ⋯: gains, weights and tasks of this level"
-        row = LevelRow(gui, name, colour, buttons, settings_hint, partial(press, name), opened or unfolded)
-        self._rows = [row]
-        if strip is not None:
-            with strip:
-                self._rows.append(LevelRow(gui, name, colour, buttons, hint, partial(press, name), None))
-        for shown in self._rows:
-            shown.update(place, self._title(place), level.enabled)
-        with row.details:
-            controls = Controls(gui, bindings, settings)
-            controls.add(f"levels.{name}.Q", f"levels.{name}.R")
-            for task in level.tasks:
-                if len(level.tasks) > 1:
-                    gui.add_html(block(f"<b>{esc(task.name)}</b>"))
-                controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
-            add_joint_targets(gui, moves, level, robot, targets)
-            with gui.add_folder("Change", expand_by_default=unfolded):
-                for task in level.tasks:
-                    TaskEditor(gui, bindings, task, robot, alone=len(level.tasks) == 1)
-                if place > 0:
-                    above = settings.levels[place - 1].name
-                    merge = gui.add_button("Merge with the level above")
-                    merge.on_click(lambda _: bindings.post(Set("stack.merge", [name, above])))
-
-    def _title(self, place: int) -> str:
-        return f"{place + 1} · {self.name}"
-
-    def update(self, now: SessionSnapshot[TorqueSettings], level: Level, place: int) -> None:
-        errors = [(task.name, now.error(task.name), task.unit) for task in level.tasks]
-        found = now.status.ranks.get(level.name)
-        for row in self._rows:
-            row.update(
-                place,
-                self._title(place),
-                level.enabled,
-                max((value for _, value, _ in errors), default=0.0),
-                error_in_words(errors),
-                "" if found is None or not level.enabled else f"{found[0]}/{found[1]} free",
-                _rank(found),
-                now.fallback(level.name) if level.enabled else "",
-            )
-
-
 def _rank(found: tuple[int, int] | None) -> str:
     """Returns a sentence with the number of directions that the level gets, and the number of its rows."""
     if found is None:
@@ -110,11 +43,7 @@ def _rank(found: tuple[int, int] | None) -> str:
 
 
 def add_joint_targets(
-    gui: viser.GuiApi,
-    bindings: Bindings[Targets],
-    level: Level,
-    robot: Robot,
-    targets: Callable[[], Targets],
+    gui: viser.GuiApi, bindings: Bindings[Targets], level: Level, robot: Robot, targets: Callable[[], Targets]
 ) -> None:
     """Adds a folder with a slider for each joint of every joint-space task whose target can be moved. If
     there is no such task, no folder is added.
@@ -191,10 +120,7 @@ class TasksPanel:
     """One row per level, in the order of priority. Another stack needs other folders: see `rebuild`."""
 
     def __init__(
-        self,
-        page: PageContext,
-        targets: Callable[[], Targets],
-        strip: viser.GuiTabHandle | None,
+        self, page: PageContext, targets: Callable[[], Targets], strip: viser.GuiTabHandle | None
     ) -> None:
         """targets: returns the present targets; strip: the tab of a panel over the scene, which shows the
         rows, too. In a lesson, whose stack is given, no task can be added."""
@@ -236,23 +162,44 @@ class TasksPanel:
             with self._strip:
                 self._rows_over_scene = self._page.gui.add_folder(None)
         with self._levels:
-            self._cards = [
-                LevelCard(
-                    self._page,
-                    self._bindings,
-                    level,
-                    place,
-                    self._targets,
-                    self._moves,
-                    self._press,
-                    opened=level.name in self._open,
-                    unfolded=any(task.name == self._edited for task in level.tasks),
-                    strip=self._rows_over_scene,
-                )
-                for place, level in enumerate(settings.levels)
-            ]
+            self._rows = {
+                level.name: self._add_level(level, place) for place, level in enumerate(settings.levels)
+            }
             if not self._page.in_lesson:
                 self._add = AddTask(self._page)
+
+    def _add_level(self, level: Level, place: int) -> LevelRow:
+        """Adds the row of a level, with its settings and the controls that edit its tasks. These are unfolded
+        if one of the tasks was just edited."""
+        page, name, settings = self._page, level.name, self._page.settings
+        unfolded = any(task.name == self._edited for task in level.tasks)
+        hint = f"On or off: key {place + 1}. ▲ ▼: priority"
+        row = LevelRow(
+            page,
+            level,
+            place,
+            (UP, DOWN),
+            (hint, f"{hint}. ⋯: gains, weights and tasks of this level"),
+            partial(self._press, name),
+            self._rows_over_scene,
+            opened=name in self._open or unfolded,
+        )
+        with row.details:
+            controls = Controls(page.gui, self._bindings, settings)
+            controls.add(f"levels.{name}.Q", f"levels.{name}.R")
+            for task in level.tasks:
+                if len(level.tasks) > 1:
+                    page.gui.add_html(block(f"<b>{esc(task.name)}</b>"))
+                controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
+            add_joint_targets(page.gui, self._moves, level, page.robot, self._targets)
+            with page.gui.add_folder("Change", expand_by_default=unfolded):
+                for task in level.tasks:
+                    TaskEditor(page.gui, self._bindings, task, page.robot, alone=len(level.tasks) == 1)
+                if place > 0:
+                    above = settings.levels[place - 1].name
+                    merge = page.gui.add_button("Merge with the level above")
+                    merge.on_click(lambda _: self._bindings.post(Set("stack.merge", [name, above])))
+        return row
 
     def _ask(self, event: Event) -> None:
         """Posts an edit. The folder of the edited task stays unfolded in the resulting stack."""
@@ -322,9 +269,20 @@ class TasksPanel:
 
     def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         for place, level in enumerate(now.settings.levels):
-            for card in self._cards:
-                if card.name == level.name:
-                    card.update(now, level, place)
+            row = self._rows.get(level.name)
+            if row is None:
+                continue  # the rows are not rebuilt yet
+            errors = [(task.name, now.error(task.name), task.unit) for task in level.tasks]
+            rank = now.status.ranks.get(level.name)
+            row.update(
+                place,
+                level.enabled,
+                max((value for _, value, _ in errors), default=0.0),
+                error_in_words(errors),
+                "" if rank is None or not level.enabled else f"{rank[0]}/{rank[1]} free",
+                _rank(rank),
+                now.fallback(level.name) if level.enabled else "",
+            )
         self._bindings.refresh(now.settings)
         self._moves.refresh(self._targets())
         cost = now.number("cost/damping")

@@ -97,6 +97,14 @@ class HtmpcPanel:
         )
 
 
+def add_servo_plant(page: PageContext) -> None:
+    """Adds the controls of the true plant's settings. The controller knows at most its lag."""
+    page.gui.add_html(
+        block("These are the true values of the simulated robot. The controller knows at most the lag.")
+    )
+    Controls(page.gui, page.bindings, page.settings).add_group("Plant")
+
+
 def _compensated(settings: VelocitySettings) -> str:
     if settings.plant.latency_ms == 0.0 and not settings.delay_measured:
         return ""

@@ -25,11 +25,7 @@ _DONE_SHOWN = 3
 class MissionPanel:
     """The list of tasks, the button Release, and controls that insert, remove and reorder tasks."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        places: Callable[[], dict[str, np.ndarray]],
-    ) -> None:
+    def __init__(self, page: PageContext, places: Callable[[], dict[str, np.ndarray]]) -> None:
         """places: returns the position at which each role's goal is drawn, (3,) m."""
         gui, settings = page.gui, page.settings
         controls, options = Controls(gui, page.bindings, settings), settings.options
@@ -64,7 +60,7 @@ class MissionPanel:
 
         @self._release.on_click
         async def _(_: object) -> None:
-            waiting = _waiting(mission_rows(page))
+            waiting = _waiting(page.mission_rows or ())
             if waiting is not None:
                 page.post(Release(waiting.name))
 
@@ -83,7 +79,7 @@ class MissionPanel:
         return round(float(x), 2), round(float(y), 2), round(float(z), 2)
 
     def _changed(self, what: str, name: str) -> None:
-        ahead = [row.name for row in mission_rows(self._page) if row.state != "done"]
+        ahead = [row.name for row in self._page.mission_rows or () if row.state != "done"]
         if name not in ahead:
             return
         if what == _REMOVE:
@@ -97,7 +93,7 @@ class MissionPanel:
         role, before = str(self._role.value), str(self._before.value)
         axes = self._points[role].axes
         goal = tuple(float(self._goal.value["xyz".index(axis)]) for axis in axes)
-        name = free_name(f"{role} added", [row.name for row in mission_rows(self._page)])
+        name = free_name(f"{role} added", [row.name for row in self._page.mission_rows or ()])
         self._page.post(
             InsertTask(name, role, goal, None if before == _END else before, hold=None if hold else 0.0)
         )
@@ -117,18 +113,13 @@ class MissionPanel:
         waiting = _waiting(mission.rows)
         self._swap.visible = len(ahead) > 1
         self._release.visible = waiting is not None
-        if waiting is not None and self._release.label != f"Release {waiting.name}":
+        if waiting is not None:
             self._release.label = f"Release {waiting.name}"
-
-
-def mission_rows(page: PageContext) -> tuple[MissionRow, ...]:
-    status = page.learner.status
-    return () if status is None or status.mission is None else status.mission.rows
 
 
 def swap(page: PageContext) -> None:
     """Moves the second open task to the first place."""
-    ahead = [row.name for row in mission_rows(page) if row.state != "done"]
+    ahead = [row.name for row in page.mission_rows or () if row.state != "done"]
     if len(ahead) > 1:
         page.post(MoveLevel(ahead[1], 0))
 

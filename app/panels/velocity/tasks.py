@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
 import viser
 
 from app.client.pending_edit import PendingEdit
 from app.html.text import block, quantity
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.level_row import MORE, OFF, ON, LevelRow
+from app.panels.widgets.level_row import MORE, LevelRow
 from app.tab.context import PageContext, SessionSnapshot
-from himpc.stack import Level
 from lessons.events import Set
 from lessons.settings.velocity import VelocitySettings
 
@@ -19,23 +18,30 @@ from lessons.settings.velocity import VelocitySettings
 class RolesPanel:
     """One row per role, in the order of the mission's window."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        strip: viser.GuiTabHandle | None,
-    ) -> None:
+    def __init__(self, page: PageContext, strip: viser.GuiTabHandle | None) -> None:
         """strip: the tab of a panel over the scene, which shows the rows, too."""
         self._page, levels = page, page.settings.levels
         self._order = tuple(level.name for level in levels)
         self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
         page.gui.add_html(block("The mission below sets the order of the levels."), order=-1.0)
-        self._cards = [_Card(page, level, place, self._switch, strip) for place, level in enumerate(levels)]
+        hints = "On or off", "⋯: the weight of this level"
+        self._rows = [
+            LevelRow(page, level, place, (), hints, partial(self._press, level.name), strip)
+            for place, level in enumerate(levels)
+        ]
+        for row in self._rows:
+            with row.details:
+                Controls(page.gui, page.bindings, page.settings).add(f"levels.{row.name}.Q")
 
     def toggle(self, place: int) -> Set | None:
         """Returns the event for the hotkey of an index (0-based); None if there is no such level."""
         if place >= len(self._order):
             return None
         return self._switch(self._order[place])
+
+    def _press(self, name: str, button: str) -> None:
+        if button != MORE:
+            self._page.post(self._switch(name))
 
     def _switch(self, name: str) -> Set:
         enabled = next(level.enabled for level in self._page.settings.levels if level.name == name)
@@ -46,54 +52,17 @@ class RolesPanel:
         places = {level.name: now.number(f"level/{level.name}") for level in now.settings.levels}
         inside = sorted((name for name in places if places[name] == places[name]), key=places.__getitem__)
         self._order = (*inside, *(name for name in places if name not in inside))
-        for card in self._cards:
-            level = next(level for level in now.settings.levels if level.name == card.name)
-            card.update(now, level, self._order.index(card.name), card.name in inside)
-
-
-class _Card:
-    """The row of one role."""
-
-    def __init__(
-        self,
-        page: PageContext,
-        level: Level,
-        place: int,
-        switch: Callable[[str], Set],
-        strip: viser.GuiTabHandle | None,
-    ) -> None:
-        name = self.name = level.name
-        gui, colour = page.gui, page.colours[name]
-
-        def press(button: str) -> None:
-            if button != MORE:
-                page.post(switch(name))
-
-        button = (ON if level.enabled else OFF,)
-        row = LevelRow(gui, name, colour, button, "⋯: the weight of this level", press)
-        self._rows = [row]
-        if strip is not None:
-            with strip:
-                self._rows.append(LevelRow(gui, name, colour, button, "On or off", press, None))
-        for shown in self._rows:
-            shown.update(place + 1, self._title(place), level.enabled)
-        with row.details:
-            Controls(gui, page.bindings, page.settings).add(f"levels.{name}.Q")
-
-    def _title(self, place: int) -> str:
-        return f"{place + 1} · {self.name}"
-
-    def update(self, now: SessionSnapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
-        task = level.tasks[0]
-        error, bound = now.error(task.name), now.number(f"bound/{level.name}")
+        levels = {level.name: level for level in now.settings.levels}
         for row in self._rows:
+            level, name = levels[row.name], row.name
+            task, error = level.tasks[0], now.error(level.tasks[0].name)
+            bound, has_task = now.number(f"bound/{name}"), name in inside
             row.update(
-                place + 1,
-                self._title(place),
+                self._order.index(name),
                 level.enabled,
-                error if inside else 0.0,
-                f"<b>{quantity(error, task.unit)}</b>" if inside else "no task now",
-                f"≤ {quantity(bound, task.unit)}" if inside and bound == bound else "",
+                error if has_task else 0.0,
+                f"<b>{quantity(error, task.unit)}</b>" if has_task else "no task now",
+                f"≤ {quantity(bound, task.unit)}" if has_task and bound == bound else "",
                 "Levels below may increase the error of this level to this bound",
-                now.fallback(level.name) if inside else "",
+                now.fallback(name) if has_task else "",
             )

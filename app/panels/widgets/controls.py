@@ -14,6 +14,7 @@ from app.adapter.names import NUMBER_BOX, ROW, SLIDER_LABEL
 from app.adapter.private import dom_id
 from app.html.palette import AXES, css, ink
 from app.html.text import figure
+from app.tab.context import PageContext
 from app.tab.mirror import Bindings, scalar
 from lessons.events import Set
 from lessons.settings.schema import Setting
@@ -195,8 +196,7 @@ class Controls(Generic[S]):
 
         def follow(settings: S) -> int:
             value = scalar(read(settings))
-            if slider.label != label(value):
-                slider.label = label(value)
+            slider.label = label(value)
             return place_of(value, low, high)
 
         self._bindings.bind(slider, follow, lambda place: Set(setting.path, value_at(place, low, high)))
@@ -214,6 +214,16 @@ class Controls(Generic[S]):
                 step=shown.step or _tenth(value),
             )
         self._bindings.bind(number, lambda s: float(read(s)), lambda given: Set(setting.path, float(given)))
+
+
+def add_dark_switch(page: PageContext) -> None:
+    """Adds the checkbox of the page's theme."""
+    dark = page.gui.add_checkbox("Dark theme", page.dark)
+
+    @dark.on_update
+    async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+        if event.client is not None:
+            page.theme(bool(dark.value))
 
 
 def add_control(

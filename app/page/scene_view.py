@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -12,23 +10,22 @@ import numpy as np
 import viser
 
 from app.adapter.names import CHART_BOX, FLOATING_PANEL, SHEET
+from app.adapter.private import unless_removed
 from app.client.ghost import GhostClient
 from app.client.moment import Moment, moment_of
-from app.client.progress import Notebook
 from app.client.simulation import Trouble
-from app.client.simulation_client import SimulationClient
-from app.html.palette import level_colours, recoloured
-from app.link.choice import SceneChoice
-from app.link.messages import Ready, Status
+from app.html.palette import recoloured
+from app.link.messages import Ready
 from app.page.comfort import Comfort
-from app.page.scene_ui import Face
-from app.page.torque_ui import TorqueFace
-from app.page.velocity_ui import VelocityFace
+from app.page.torque import TorqueView
+from app.page.velocity import VelocityView
 from app.panels.lesson.step import Course
 from app.panels.run.active_constraints import BindingPanel
 from app.panels.run.compare import ComparePanel
 from app.panels.run.export import ExportPanel, SharePanel, add_hand_in
 from app.panels.run.help import HelpPanel
+from app.panels.run.joints import JointPlots
+from app.panels.run.move import MovePanel
 from app.panels.run.playback import PlaybackPanel, TimeLine
 from app.panels.run.scene import RobotPanel
 from app.panels.widgets.command import add_command
@@ -36,7 +33,6 @@ from app.tab.context import PageContext, SessionSnapshot
 from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView
-from lessons.own.folder import Folder
 from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
 from lessons.settings.velocity import VelocitySettings
@@ -58,37 +54,21 @@ _SIDE = 400.0  # px: width of a docked panel
 _FITS = f"<style>{FLOATING_PANEL} {{ max-width: calc(100vw - {_SIDE + 2.0 * _GAP:g}px) }}</style>"
 """Keeps a wide panel over the scene off the docked panel when the window becomes narrower."""
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
-_FACES: dict[type[SceneSettings], Callable[[PageContext], Face]] = {
-    TorqueSettings: TorqueFace,
-    VelocitySettings: VelocityFace,
+_VIEWS: dict[type[SceneSettings], type[TorqueView | VelocityView]] = {
+    TorqueSettings: TorqueView,
+    VelocitySettings: VelocityView,
 }
 
 
-class Stage:
+class SceneView:
     """The view of one scene, built once per scene. The page's loop calls `follow`; callbacks only post
     events."""
 
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        learner: SimulationClient,
-        ready: Ready,
-        dark: bool,
-        choose: Callable[[SceneChoice], None],
-        theme: Callable[[bool], None],
-        own_files: Folder | None,
-        loop: asyncio.AbstractEventLoop,
-        notebook: Notebook,
-        comfort: Comfort,
-        narrow: bool,
-    ) -> None:
+    def __init__(self, page: PageContext, comfort: Comfort, narrow: bool) -> None:
         """narrow: whether the page, for example on a phone, has no room for a second panel. The plots
         are then tabs of the right panel."""
-        self._client, self._learner = client, learner
-        self._theme, self._comfort = theme, comfort
-        colours = level_colours([task.level for task in in_order(ready)])
-        self.page = PageContext(client, learner, ready, colours, loop, dark, choose, self._change_theme)
-        self._face = face_for(self.page)
+        self.page, self._client, self._learner, self._comfort = page, page.client, page.learner, comfort
+        self._level = view_of(page)
         self.shown: tuple[object, ...] | None = None
         """Identifies the instant that was shown last; None before the first instant."""
         self.covered = 0.0, 0.0
@@ -99,24 +79,18 @@ class Stage:
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: GhostClient | None = None
-        self._build_panels(client.gui, own_files, notebook, narrow)
-        self._build_scene(client.scene, dark)
+        self._build_panels(page.gui, narrow)
+        self._build_scene(page.client.scene)
 
     # ---------------------------------------------------------------- building
 
-    def _build_panels(
-        self,
-        gui: viser.GuiApi,
-        own_files: Folder | None,
-        notebook: Notebook,
-        narrow: bool,
-    ) -> None:
+    def _build_panels(self, gui: viser.GuiApi, narrow: bool) -> None:
         gui.add_html(_PHONE + _CHARTS)
         exercise = self._learner.choice_of(self.page.ready).exercise
         # On a phone, time and speed come after the question.
         with gui.add_folder(None, order=math.inf if narrow else -1.0):
             brief = exercise is not None
-            self._playback = PlaybackPanel(self.page, self._face.fastest, brief)
+            self._playback = PlaybackPanel(self.page, self._level.fastest, brief)
             self._time_line = TimeLine(self.page)
         tabs = gui.add_tab_group(order=0.0)
         learn, tasks = tabs.add_tab("Learn"), tabs.add_tab("Tasks")
@@ -126,38 +100,42 @@ class Stage:
         control, robot = places or [more.add_tab("Control"), more.add_tab("Robot")]
         plots = more if narrow else gui.add_panel()
         width, height = self._comfort.window or (0, 0)
-        roomy = width >= _ROOMY[0] and height >= _ROOMY[1] and not self._face.opens_inside
+        roomy = width >= _ROOMY[0] and height >= _ROOMY[1] and not self._level.opens_inside
         if not narrow:
-            self._face.open_plots(plots)
+            self._level.open_plots(plots)
         with learn:
-            beside = None if narrow else plots
-            self._course = Course(self.page, notebook, beside)
+            self._course = Course(self.page, None if narrow else plots)
         with learn if exercise is None else robot:
-            self._face.add_start()
+            self._level.add_start()
+            self._move = MovePanel(gui, self._level.movables)
         # The levels also stand over the scene, so that a learner who reads can see and swap them.
         strip = None if narrow else gui.add_panel()
         with tasks:
-            self._face.add_tasks(None if strip is None else strip.add_tab("Levels"))
+            self._level.add_tasks(None if strip is None else strip.add_tab("Levels"))
         with control:
-            self._face.add_control()
+            self._level.add_control()
         with robot:
-            self._robot_panel = RobotPanel(self.page, own_files)
+            self._robot_panel = RobotPanel(self.page)
             with gui.add_folder("Plant", expand_by_default=False):
-                self._face.add_plant()
+                self._level.add_plant()
         with more.add_tab("Compare"):
             self._compare = ComparePanel(self.page)
         with more.add_tab("Export"):
             ExportPanel(self.page)
             SharePanel(self.page)
-            add_hand_in(gui, self._learner, notebook)
+            add_hand_in(self.page)
         with more.add_tab("Help"):
             self._comfort.add_switch(gui)
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS):  # hotkeys also for levels that may be added later
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
-        self._face.add_plots(plots, more if roomy else plots)
+        with plots.add_tab("Errors"):
+            self._level.add_plots()
+        with plots.add_tab("Joints"):
+            self._joint_plots = JointPlots(self.page, self._level.input)
+        self._level.add_inside(more if roomy else plots)
         with plots.add_tab("Who binds"):
-            self._binding = BindingPanel(gui, self.page.colours)
+            self._binding = BindingPanel(self.page)
         above = below = 0.0
         if strip is not None:
             strip.float(x=_GAP, y=_GAP, width=320.0)
@@ -181,23 +159,19 @@ class Stage:
         self.covered = above, below
 
     def _toggle(self, place: int) -> None:
-        event = self._face.toggle(place)
+        event = self._level.toggle(place)
         if event is not None:
             self.page.post(event)
 
-    def _build_scene(self, scene: viser.SceneApi, dark: bool) -> None:
+    def _build_scene(self, scene: viser.SceneApi) -> None:
         # Shadows triple the rendering time of a frame, which matters on a laptop or a phone.
         scene.configure_default_lights(cast_shadow=False)
         self._floor = _floor(scene, self.page.ready.room)
-        self._paint_floor(dark)
-        self._robot = RobotView(scene, self.page.ready.robot)
-        self._face.add_scene(scene, self._robot)
+        self.paint_floor(self.page.dark)
+        self._robot = RobotView(scene, self.page.robot)
+        self._level.add_scene(self._robot)
 
-    def _change_theme(self, dark: bool) -> None:
-        self._theme(dark)
-        self._paint_floor(dark)
-
-    def _paint_floor(self, dark: bool) -> None:
+    def paint_floor(self, dark: bool) -> None:
         """Sets the colours of the floor's grid lines, which are less conspicuous than the robot on every
         background."""
         cell, section = (70, 105) if dark else (215, 175)
@@ -210,7 +184,7 @@ class Stage:
         colours = recoloured([task.level for task in in_order(ready)], self.page.colours)
         self.page.colours.clear()
         self.page.colours.update(colours)
-        self._face.recompose()
+        self._level.recompose()
 
     # ---------------------------------------------------------------- following
 
@@ -246,11 +220,13 @@ class Stage:
             if learner.failure is not None:
                 return
             if moment.live and moment.status.resets != self._resets:
-                self._after_reset(moment.status, first=self._resets is None)
+                if self._resets is not None:
+                    self._level.after_reset(moment.status)
                 self._resets = moment.status.resets
-            self._face.follow(moment)
+            self._level.follow(moment)
             if plots:
-                self._face.draw(moment)
+                self._level.draw(moment)
+                self._joint_plots.draw(moment.window, moment.beside)
                 if self._ghost is not None and moment.ghost is not None:
                     self._ghost.draw(moment.ghost)
 
@@ -266,10 +242,6 @@ class Stage:
             self._shown_ghost = ghost
         self._ghost.move(moment.ghost)
 
-    def _after_reset(self, status: Status, first: bool) -> None:
-        if not first:
-            self._face.after_reset(status)
-
     def _write(self, moment: Moment) -> None:
         learner, settings = self._learner, self.page.settings
         found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
@@ -284,7 +256,8 @@ class Stage:
             self._comfort.follow(now)
             if found[1] > 0:
                 self._compare.update(now)
-                self._face.write(shown)
+                self._level.write(shown)
+                self.page.loop.call_soon_threadsafe(unless_removed, self._move.update)
                 self._binding.update(shown)
             lecture = learner.lecture_of(self.page.ready)
             self._course.follow(lecture, settings)
@@ -308,7 +281,7 @@ class Stage:
         self.page.bindings.close()
         self._playback.close()
         self._time_line.close()
-        self._face.close()
+        self._level.close()
 
 
 def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
@@ -320,6 +293,6 @@ def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
     return scene.add_grid("/floor", width=side, height=side, cell_size=0.5, section_size=1.0)
 
 
-def face_for(page: PageContext) -> Face:
+def view_of(page: PageContext) -> TorqueView | VelocityView:
     """Returns the user interface for the kind of scene that is loaded."""
-    return _FACES[type(page.ready.settings)](page)
+    return _VIEWS[type(page.ready.settings)](page)

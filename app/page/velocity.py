@@ -9,28 +9,24 @@ from typing import ClassVar
 import numpy as np
 import viser
 
-from app.adapter.private import unless_removed
 from app.client.moment import Moment
 from app.html.text import free_name
 from app.link.messages import Status, TaskView
-from app.page.scene_ui import Tabs
-from app.panels.run.joints import ACCELERATION, JointPlots
-from app.panels.run.move import MovePanel
-from app.panels.velocity.controller import HtmpcPanel
+from app.panels.run.joints import ACCELERATION, Input
+from app.panels.run.plots import PlotsPanel, velocity_plots
+from app.panels.velocity.controller import HtmpcPanel, add_servo_plant
 from app.panels.velocity.mission import MissionPanel
-from app.panels.velocity.plant import add_servo_plant
-from app.panels.velocity.plots import TrackingPlots
-from app.panels.velocity.start import BeginPanel, last_ball
+from app.panels.velocity.start import BeginPanel
 from app.panels.velocity.tasks import RolesPanel
 from app.tab.context import PageContext, SessionSnapshot
 from app.view.camera import FollowBase
 from app.view.coordinates import full
 from app.view.drag import TargetFrames
-from app.view.drag_target import Movable
 from app.view.goals import Goals
 from app.view.obstacles import Obstacles, ReportedObstacles
-from app.view.robot import RobotView, gizmo_size, look_at
+from app.view.robot import RobotView, look_at
 from app.view.surroundings import Carried, People, ReachCircle
+from app.view.targets import Movable
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Appear, Set
@@ -42,11 +38,20 @@ _AHEAD, _RADIUS = 0.7, 0.2
 """Distance in front of the hand at which a new obstacle appears, and its radius, m."""
 
 
-class VelocityFace:
-    """The user interface of a velocity-level scene; `app.page.scene_ui.Face` describes its methods."""
+class VelocityView:
+    """The user interface of a velocity-level scene, a part of `app.page.scene_view.SceneView`. It is built by
+    `open_plots`, `add_start`, `add_tasks`, `add_control`, `add_plant`, `add_plots`, `add_inside` and
+    `add_scene`, in this order. `follow` is called for every frame, `draw` about ten times per second, and
+    `write` a few times per second.
+
+    Attributes:
+        fastest: the highest useful speed of the simulation, simulated seconds per second.
+        input: the input of the joints that is plotted.
+    """
 
     fastest: ClassVar[float] = 10.0
-    opens_inside = False
+    input: ClassVar[Input] = ACCELERATION
+    opens_inside: ClassVar[bool] = False
 
     def __init__(self, page: PageContext) -> None:
         self._page = page
@@ -57,13 +62,11 @@ class VelocityFace:
     # ---------------------------------------------------------------- building
 
     def add_start(self) -> None:
-        self._begin = BeginPanel(self._page, bool(self._base))
-        self._move = MovePanel(self._page.gui, self._movables)
-        self._begin.on_look = self._look
-        self._begin.on_obstacle = self._add_obstacle
-        self._begin.on_clear = self._clear_ball
+        self._begin = BeginPanel(self._page, bool(self._base), self._look, self._add_obstacle)
 
     def add_tasks(self, strip: viser.GuiTabHandle | None) -> None:
+        """Adds the levels and what stands with them; the rows of the levels also to the tab `strip` of a
+        panel over the scene."""
         self._roles = RolesPanel(self._page, strip)
         self._mission = MissionPanel(self._page, lambda: self._goals.places)
 
@@ -73,35 +76,27 @@ class VelocityFace:
     def add_plant(self) -> None:
         add_servo_plant(self._page)
 
-    def open_plots(self, plots: Tabs) -> None:
-        pass
+    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
+        """Adds the tab of the picture of a tick, which precedes the lesson's tab, if it is the first one. At
+        this level there is none: the compiled cascade does not show a tick."""
 
-    def add_plots(self, plots: Tabs, inside: Tabs) -> None:
-        del inside  # the compiled cascade of this level does not show a tick
-        with plots.add_tab("Errors"):
-            self._plots = TrackingPlots(self._page)
-        with plots.add_tab("Joints"):
-            self._joint_plots = JointPlots(self._page, ACCELERATION)
+    def add_plots(self) -> None:
+        self._plots = PlotsPanel(self._page, velocity_plots)
 
-    def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
-        del robot  # velocity servos do not react to a pull
-        page, ready = self._page, self._page.ready
-        size = gizmo_size(ready.robot)
+    def add_inside(self, tabs: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
+        """Adds the picture of a tick, which is not known at this level."""
+
+    def add_scene(self, robot: RobotView) -> None:
+        """Adds all objects except the robot and the floor to the 3D view. robot: velocity servos do not react
+        to a pull of its links."""
+        del robot
+        page, scene = self._page, self._page.client.scene
         self._frames = TargetFrames(scene)
         self._obstacles = Obstacles(scene, self._put)
         self._reported = ReportedObstacles(scene)
         self._people = People(scene)
         self._carried = Carried(scene)
-        self._goals = Goals(
-            scene,
-            ready,
-            page.colours,
-            page.poses_or_still(),
-            size,
-            page.post,
-            self._status,
-            self._begin.dragged,
-        )
+        self._goals = Goals(page)
         self._trails = {
             task.name: Trails(scene, [], page.colours[task.level], f"_{task.name}", scale=1)
             for task in self._points
@@ -110,7 +105,7 @@ class VelocityFace:
         self._circle: ReachCircle | None = None
         if self._base:
             first = len(self._base)
-            self._circle = ReachCircle(scene, first, horizontal_reach(ready.robot, first))
+            self._circle = ReachCircle(scene, first, horizontal_reach(page.robot, first))
 
     def recompose(self) -> None:
         """Does nothing: the mission of a velocity-level scene defines its stack, which never changes."""
@@ -120,16 +115,15 @@ class VelocityFace:
     def _settings(self) -> VelocitySettings:
         return self._page.settings
 
-    def _status(self) -> Status | None:
-        return self._page.learner.status
-
     def toggle(self, place: int) -> Set | None:
+        """Returns the event that switches the level at an index (0-based) on or off; None if there is no such
+        level."""
         return self._roles.toggle(place)
 
     def _put(self, name: str, centre: tuple[float, float, float]) -> None:
         self._page.post(Set(f"obstacles.{name}", centre))
 
-    def _movables(self) -> list[Movable]:
+    def movables(self) -> list[Movable]:
         goals = self._goals.movables()
         taken = {each.name for each in goals}
         return goals + [
@@ -156,11 +150,6 @@ class VelocityFace:
         name = free_name("ball", taken)
         self._page.post(Appear(name, (float(x), float(y), float(poses[-1, 2])), _RADIUS))
 
-    def _clear_ball(self) -> None:
-        ball = last_ball(self._settings())
-        if ball is not None:
-            self._page.post(Set(f"obstacles.{ball.name}", None))
-
     def _look(self) -> None:
         poses = self._page.poses()
         if poses is not None:
@@ -186,7 +175,7 @@ class VelocityFace:
         return np.array([*poses[len(self._base) - 1, :2], 0.01])
 
     def after_reset(self, status: Status) -> None:
-        pass
+        """Updates the interface after the robot was reset to its start: nothing, as goals stay."""
 
     def draw(self, moment: Moment) -> None:
         status, latest, settings = moment.status, moment.latest, self._settings()
@@ -208,9 +197,7 @@ class VelocityFace:
             way = np.array([self._at(task, poses) for poses in moment.way]).reshape(-1, 3)
             trail.draw(way, np.zeros((0, 3)) if path is None else path, settings.T_s)
         self._draw_desired(latest)
-        beside = None if moment.ghost is None else moment.ghost.window
-        self._plots.draw(moment.window, beside, settings.T_s)
-        self._joint_plots.draw(moment.window, beside)
+        self._plots.draw(moment.window, moment.beside)
 
     def _draw_desired(self, latest: np.ndarray) -> None:
         """Draws the present reference of the hand, position and orientation."""
@@ -222,10 +209,9 @@ class VelocityFace:
 
     def write(self, now: SessionSnapshot[VelocitySettings]) -> None:
         self._begin.update(now)
-        self._page.loop.call_soon_threadsafe(unless_removed, self._move.update)
         self._mission.update(now)
         self._roles.update(now)
         self._controller.update(now)
 
     def close(self) -> None:
-        pass
+        """Stops all updates, before the scene is removed."""

@@ -1,11 +1,47 @@
-"""Pieces of curves that are drawn as SVG: round ticks with their labels, and paths."""
+"""The drawing kit: SVG elements, paths through points, and round ticks with their labels."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
-from app.html.text import power_of_ten
+from app.html.text import esc, power_of_ten
+
+
+def element(tag: str, inner: str = "", **attributes: object) -> str:
+    """Returns an SVG element. In the names of attributes, an underscore stands for a hyphen. Numbers get one
+    digit after the decimal point. An attribute without a value (None) is left out."""
+    given = "".join(
+        f' {name.rstrip("_").replace("_", "-")}="{round(value, 1) if isinstance(value, float) else value}"'
+        for name, value in attributes.items()
+        if value is not None
+    )
+    return f"<{tag}{given}>{inner}</{tag}>" if inner else f"<{tag}{given}/>"
+
+
+def path(d: str, **attributes: Any) -> str:
+    return element("path", d=d, **attributes)
+
+
+def text(x: float, y: float, words: str, anchor: str = "start", **attributes: Any) -> str:
+    """Returns a text at a point; names in it may come from a file."""
+    return element("text", esc(words), x=float(x), y=float(y), text_anchor=anchor, **attributes)
+
+
+def picture(width: float, height: float, words: str, inner: str, style: str = "display:block") -> str:
+    """Returns a picture as wide as its panel. words: for people who do not see it."""
+    return element(
+        "svg",
+        inner,
+        viewBox=f"0 0 {width:g} {height:g}",
+        width="100%",
+        role="img",
+        aria_label=esc(words),
+        style=style,
+        font_size=11,
+        font_family="inherit",
+    )
 
 
 def round_step(step: float) -> float:
