@@ -142,7 +142,6 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
 
 
 def stop(server: viser.ViserServer) -> None:
-    """Stops the server without printing anything."""
     with _silent():
         server.stop()
 
@@ -264,7 +263,6 @@ async def read_storage(
 
 
 def run_script(client: viser.ClientHandle, source: str) -> None:
-    """Runs JavaScript in the page."""
     client._websock_connection.queue_message(_messages.RunJavascriptMessage(source))
 
 

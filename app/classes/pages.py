@@ -17,7 +17,6 @@ PageName = Literal["phone", "teacher"]
 
 @cache
 def page(name: PageName) -> str:
-    """Returns the page as one file."""
     return _file(f"{name}.html").replace("/*style*/", _style(name)).replace("/*script*/", _script(name))
 
 
@@ -33,7 +32,6 @@ def policy(name: PageName, host: str) -> str:
 
 @lru_cache(maxsize=16)
 def qr(address: str) -> str:
-    """Returns the QR code of an address as SVG."""
     drawn = io.BytesIO()
     segno.make(address, error="m").save(
         drawn, kind="svg", xmldecl=False, svgns=True, omitsize=True, border=2, light="#fff"

@@ -34,7 +34,6 @@ class Seats:
             self._seats[who] = show, None
 
     def rise(self, who: str) -> None:
-        """Called when a learner's page was closed."""
         with self._lock:
             self._seats.pop(who, None)
 
@@ -79,12 +78,10 @@ class BuildQueue:
         self._waiting, self._building = list(self._building), {}
 
     def enter(self, who: str) -> None:
-        """Adds a learner at the end of the queue."""
         self._building.pop(who, None)
         self._waiting.append(who)
 
     def leave(self, who: str) -> None:
-        """Removes a learner who has left."""
         self._building.pop(who, None)
         if who in self._waiting:
             self._waiting.remove(who)
@@ -162,7 +159,6 @@ class Room(ABC):
 
     @property
     def state(self) -> Gathering:
-        """The present state of the class."""
         with self._lock:
             return self._state
 
@@ -259,7 +255,6 @@ class Room(ABC):
         self.seats.show(self.state, before)
 
     def _build(self) -> None:
-        """Brings the next learners to the class's step."""
         if not self._builds.before():
             return
         learners, now = self._learners(), time.monotonic()

@@ -55,7 +55,6 @@ class SavedGathering(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def saved(state: Gathering) -> SavedGathering:
-    """Returns a class as data."""
     poll = None if state.poll is None or state.place is None else Held(state.place, state.poll, state.truth)
     return SavedGathering(
         None if state.place is None else _told(state.place),

@@ -109,13 +109,11 @@ class Sockets:
         self._hall.start(self._tell)
 
     def close(self) -> None:
-        """Stops sending."""
         self._hall.close()
 
     # ---------------------------------------------------------------- one page
 
     async def phone(self, line: Line) -> None:
-        """Serves a phone until its page is closed."""
         seat = ""
         try:
             while True:
@@ -153,7 +151,6 @@ class Sockets:
                 raise InputError(_NONSENSE)
 
     async def teacher(self, line: Line) -> None:
-        """Serves a page of the teacher until it is closed."""
         self._teachers.add(line)
         try:
             await line.send(json.dumps(self._greeting()))

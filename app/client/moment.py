@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.client.ghost import GhostClient
 from app.client.recording import PlotWindow
 from app.client.simulation import Simulation
-from app.client.simulation_client import SimulationClient
+from app.client.simulation_client import GhostClient, SimulationClient
 from app.link.messages import Status
 
 TRACE_SECONDS = 6.0

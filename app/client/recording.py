@@ -4,7 +4,7 @@ are left out) and for looking back, exact rows for export, and running sums over
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -101,7 +101,6 @@ _HELD = round(
     1.0 / _SPAN
 )  # largest number of buckets without a row (slow controller) that are filled from the bucket before them
 
-Take = Callable[[np.ndarray], None]
 _LEVELS = (2, 4, 8, 16, 32)
 
 
@@ -114,18 +113,22 @@ class History:
     one clock have the same buckets. Each row is read only once, whatever span of
     time the plots show. A reset sets the time back and
     clears the curves, since a jump would look like a motion.
+
+    Attributes:
+        score: the figures of the run.
+        rows: exact rows, for export.
     """
 
-    def __init__(self, block: Block, layout: Layout, *takers: Take) -> None:
-        """takers: functions that also receive each portion of rows of a run."""
+    def __init__(self, block: Block, layout: Layout, rows: RowHistory | None = None) -> None:
+        """rows: the exact rows so far, of a run that continues with another stack."""
         self.layout = layout
+        self.score, self.rows = RunStatistics(layout), rows or RowHistory(layout)
         self.latest = np.full(layout.size, np.nan)
         from himpc.limits import CONSTRAINTS
 
         joints = layout.fields["at_bound"].stop - layout.fields["at_bound"].start
         self.bound_ticks = np.zeros((joints, len(CONSTRAINTS)))
         self.bucket = -1
-        self._takers = takers
         self._block = block
         self._t = layout.fields["t"].start
         self._before = self._count = 0
@@ -136,7 +139,7 @@ class History:
         self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)
         self._first = np.full(layout.size, np.nan)  # the open bucket's first row
 
-    def under(self, block: Block, layout: Layout, *takers: Take) -> History:
+    def under(self, block: Block, layout: Layout) -> History:
         """Returns the same curves in the layout of another stack; the run continues with that stack."""
         from himpc.telemetry import relaid
 
@@ -144,7 +147,7 @@ class History:
             flat = rows.reshape(-1, self.layout.size)
             return relaid(flat, self.layout, layout).reshape(*rows.shape[:-1], layout.size)
 
-        new = History(block, layout, *takers)
+        new = History(block, layout, self.rows.under(layout))
         new.latest, new._first = moved(self.latest), moved(self._first)
         known = self._numbers >= 0
         new._pairs[known], new._lasts[known] = moved(self._pairs[known]), moved(self._lasts[known])
@@ -184,8 +187,8 @@ class History:
             self._hold(bucket)
             slot = self._merge(bucket, rows[start:end])
             self._bits[slot] |= np.bitwise_or.reduce(bits[start:end], axis=0)
-        for take in self._takers:
-            take(rows)
+        self.score.append_rows(rows)
+        self.rows.take(rows)
 
     def _hold(self, until: int) -> None:
         """Fills the buckets between the newest bucket and the bucket `until` with the last values of the

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from app.commands.lists import HeldJoints, RobotFile, Tool
 from app.commands.output import (
     check_file,
     figure,
@@ -16,7 +17,6 @@ from app.commands.output import (
     write_file,
     write_json,
 )
-from app.commands.robots import HeldJoints, RobotFile, Tool
 from robots import InputError
 
 if TYPE_CHECKING:

@@ -51,7 +51,6 @@ def round_step(step: float) -> float:
 
 
 def ticks(low: float, high: float, about: int = 4) -> list[float]:
-    """Returns round numbers between two values."""
     step = round_step((high - low) / about)
     return [
         round(k * step, 12) for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)

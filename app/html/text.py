@@ -39,7 +39,6 @@ def _digits(size: float) -> int:
 
 
 def swatch(colour: RGB) -> str:
-    """Returns a small square in a level's colour."""
     return (
         '<span style="display:inline-block;width:0.75em;height:0.75em;border-radius:2px;'
         f'background:{css(colour)};margin-right:0.4em"></span>'

@@ -87,5 +87,4 @@ def outside(environment: Mapping[str, str], port: int) -> tuple[bool, str]:
 
 
 def here() -> Surroundings | None:
-    """Returns the Jupyter server of this process."""
     return surroundings(os.environ)

@@ -19,7 +19,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready
 from app.link.process import wait_until
 from app.link.threads import on_thread
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from lessons.events import MoveTarget, Set
 from lessons.recording.arrays import named
 from lessons.scenes.run_spec import RunSpec
@@ -80,7 +80,8 @@ class Lab:
         """embed_in: origins of the pages that may show the robot's page in a frame."""
         trusted = [origin for origin in embed_in if "://" in origin]
         self._server = PageServer(
-            choice, port=0, classroom=True, all_steer=True, trusted_origins=trusted, embed_in=embed_in
+            choice,
+            ServerOptions(port=0, classroom=True, all_steer=True, trusted_origins=trusted, embed_in=embed_in),
         )
         (self._learner,) = self._server.sessions.learners
         ended = threading.Event()

@@ -252,13 +252,11 @@ class Spares:
         SERVER.enter(worker)
 
     def refill(self) -> None:
-        """Starts a spare if there is none."""
         with self._lock:
             if not self._closed and (self._spare is None or not self._spare.alive):
                 self._spare = Process(self._worker)
 
     def take(self) -> Process:
-        """Returns the spare, or a new child."""
         with self._lock:
             spare, self._spare = self._spare, None
         return spare if spare is not None and spare.alive else Process(self._worker)
@@ -275,7 +273,6 @@ class Spares:
 
 
 def _run(worker: str, page: Connection) -> None:
-    """The child's main function."""
     fork_server.hang_up()
     end_with_parent()
     import_module(worker).main(page)

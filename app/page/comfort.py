@@ -57,7 +57,6 @@ class Facts:
 
 
 def facts_of(now: SessionSnapshot[SceneSettings]) -> Facts:
-    """Returns the facts of a snapshot."""
     status = now.status
     fields = now.ready.layout.fields
     return Facts(
@@ -263,7 +262,6 @@ class Comfort:
             learner.send(Play(False))
 
     def add_switch(self, gui: viser.GuiApi) -> None:
-        """Adds the checkbox that shows the line on the screen."""
         switch = gui.add_checkbox(
             "Say what happens",
             self.says,

@@ -35,7 +35,7 @@ from robots import InputError
 
 if TYPE_CHECKING:
     from app.page.scene_view import SceneView
-    from app.view.recorded import RecordedRun
+    from app.view.robot import RecordedRun
 
 
 class LessonFile:
@@ -90,14 +90,12 @@ LEAST = 1 / 3
 
 
 def lay_out(gui: viser.GuiApi) -> None:
-    """Names and places the main panel."""
     gui.set_panel_label("himpc-lab")
     gui.main_panel.dock_right()
     gui.main_panel.set_width(400)
 
 
 def starting(choice: SceneChoice) -> str:
-    """Returns what a page shows until its robot is there."""
     return block("<b>Starting the robot …</b>") + first_lesson(choice)
 
 
@@ -295,7 +293,7 @@ class Page:
         if self._recorded is not None:
             self._recorded.follow(now)
         elif self._waiting is not None and self.learner.compiles and opens_first(self.learner.choice):
-            from app.view.recorded import RecordedRun
+            from app.view.robot import RecordedRun
 
             self._recorded = RecordedRun(self._client, self._phone, now)
 
@@ -311,8 +309,8 @@ class Page:
         # Imported here, so that the page can open and show a waiting message before these modules are loaded.
         from app.page.scene_view import SceneView
         from app.tab.context import PageContext
-        from app.view.coordinates import in_order
         from app.view.robot import aim
+        from app.view.targets import in_order
 
         self._drop_scene()
         self._recorded = None
@@ -441,7 +439,6 @@ class Cadence:
         return 1 / CALM if self._calm(now) else 1 / (self._share * POSES)
 
     def plots_due(self, now: float) -> bool:
-        """Returns whether the plots should be drawn now."""
         if self._calm(now):
             return True
         if now < self._next_plots:

@@ -11,28 +11,27 @@ import viser
 
 from app.adapter.names import CHART_BOX, FLOATING_PANEL, SHEET
 from app.adapter.private import unless_removed
-from app.client.ghost import GhostClient
 from app.client.moment import Moment, moment_of
 from app.client.simulation import Trouble
+from app.client.simulation_client import GhostClient
 from app.html.palette import recoloured
 from app.link.messages import Ready
 from app.page.comfort import Comfort
 from app.page.torque import TorqueView
 from app.page.velocity import VelocityView
 from app.panels.lesson.step import Course
-from app.panels.run.active_constraints import BindingPanel
 from app.panels.run.compare import ComparePanel
 from app.panels.run.export import ExportPanel, SharePanel, add_hand_in
 from app.panels.run.help import HelpPanel
 from app.panels.run.joints import JointPlots
 from app.panels.run.move import MovePanel
 from app.panels.run.playback import PlaybackPanel, TimeLine
+from app.panels.run.plots import BindingPanel
 from app.panels.run.scene import RobotPanel
 from app.panels.widgets.command import add_command
 from app.tab.context import PageContext, SessionSnapshot
-from app.view.coordinates import in_order
-from app.view.ghost import GhostView
-from app.view.robot import RobotView
+from app.view.robot import GhostView, RobotView
+from app.view.targets import in_order
 from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
 from lessons.settings.velocity import VelocitySettings
@@ -294,5 +293,4 @@ def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
 
 
 def view_of(page: PageContext) -> TorqueView | VelocityView:
-    """Returns the user interface for the kind of scene that is loaded."""
     return _VIEWS[type(page.ready.settings)](page)

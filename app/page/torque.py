@@ -19,15 +19,13 @@ from app.panels.torque.controller import ControllerPanel, HorizonPanel, add_plan
 from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
 from app.tab.context import PageContext, SessionSnapshot
-from app.view.coordinates import draggable
 from app.view.drag import Hand, TargetFrames, paused_words
 from app.view.ellipsoids import EllipsoidView
 from app.view.pull import Pull
-from app.view.robot import CoverView, LinkPicker, RobotView
+from app.view.robot import CoverView, JointTurns, LinkPicker, RobotView
 from app.view.surroundings import ContactView, WorldView
-from app.view.targets import Movable, Targets
+from app.view.targets import Movable, Targets, draggable
 from app.view.trails import Trails
-from app.view.turns import JointTurns
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 

@@ -15,18 +15,16 @@ from app.link.messages import Status, TaskView
 from app.panels.run.joints import ACCELERATION, Input
 from app.panels.run.plots import PlotsPanel, velocity_plots
 from app.panels.velocity.controller import HtmpcPanel, add_servo_plant
-from app.panels.velocity.mission import MissionPanel
+from app.panels.velocity.mission import MissionPanel, RolesPanel
 from app.panels.velocity.start import BeginPanel
-from app.panels.velocity.tasks import RolesPanel
 from app.tab.context import PageContext, SessionSnapshot
 from app.view.camera import FollowBase
-from app.view.coordinates import full
 from app.view.drag import TargetFrames
 from app.view.goals import Goals
 from app.view.obstacles import Obstacles, ReportedObstacles
 from app.view.robot import RobotView, look_at
 from app.view.surroundings import Carried, People, ReachCircle
-from app.view.targets import Movable
+from app.view.targets import Movable, full
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Appear, Set

@@ -17,10 +17,9 @@ from app.html.text import quantity
 from app.link.exercise import Lecture
 from app.link.messages import TaskView
 from app.tab.context import PageContext
-from app.view.coordinates import full, of_task, raw, xyzw
 from app.view.reachability import Question, Reachability, ReachabilityWorker
 from app.view.robot import ARROW, gizmo_size, target_radius
-from app.view.targets import OPACITY, Gap, Handle, Movable, wxyz
+from app.view.targets import OPACITY, Gap, Handle, Movable, full, of_task, raw, wxyz, xyzw
 from lessons.events import MoveTarget
 from lessons.teaching.lesson import Challenge
 from lessons.teaching.prediction import Choice
@@ -78,9 +77,7 @@ class TargetGizmo:
             moved(self.raw, self.rotation if self.turns else None)
 
         def ball(name: str, colour: RGB, opacity: float, visible: bool) -> viser.IcosphereHandle:
-            return scene.add_icosphere(
-                name, radius=radius, color=colour, opacity=opacity, visible=visible, cast_shadow=False
-            )
+            return scene.add_icosphere(name, radius=radius, color=colour, opacity=opacity, visible=visible)
 
         place = {"wxyz": wxyz(rotation), "visible": orientation is not None}
         arrows = self._arrows = Handle(scene, "/target", position.axes, size, position=start)

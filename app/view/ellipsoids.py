@@ -56,8 +56,6 @@ class EllipsoidView:
                 scale=size,
                 wxyz=turn,
                 position=each.position,
-                cast_shadow=False,
-                receive_shadow=False,
             )
         else:
             node.scale, node.wxyz, node.position = size, turn, each.position

@@ -51,11 +51,9 @@ class Goal:
             else self.handle.control
         )
         if floor:
-            scene.add_cylinder(
-                f"{node}/disc", radius=_DISC, height=0.015, color=colour, opacity=0.6, cast_shadow=False
-            )
+            scene.add_cylinder(f"{node}/disc", radius=_DISC, height=0.015, color=colour, opacity=0.6)
         else:
-            scene.add_icosphere(f"{node}/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
+            scene.add_icosphere(f"{node}/ball", radius=_BALL, color=colour, opacity=0.8)
         self._label = scene.add_label(f"{node}/label", role, position=(0.0, 0.0, 0.9 * size + 0.06))
         self._gap = Gap(scene, f"/gap/{role}", colour, 0.008, _GAP)
         if moved is not None and self.handle is not None:

@@ -70,16 +70,11 @@ class _Solid:
                 dimensions=obstacle.size,
                 position=obstacle.centre,
                 wxyz=turn,
-                cast_shadow=False,
             )
             size = 0.5 * max(obstacle.size)
         else:
             self._body = scene.add_icosphere(
-                f"/obstacle/{index}",
-                radius=obstacle.radius,
-                color=_COLOUR,
-                position=obstacle.centre,
-                cast_shadow=False,
+                f"/obstacle/{index}", radius=obstacle.radius, color=_COLOUR, position=obstacle.centre
             )
             size = obstacle.radius
         self._handle = Handle(
@@ -136,23 +131,14 @@ class ReportedObstacles:
         turn = vtf.SO3.from_z_radians(told.yaw if isinstance(told, Box) else 0.0).wxyz
         root = scene.add_frame(node, show_axes=False, position=told.centre, wxyz=turn)
         if isinstance(told, Box):
-            scene.add_box(
-                f"{node}/fill", color=_WRONG, dimensions=told.size, opacity=_FILL, cast_shadow=False
-            )
+            scene.add_box(f"{node}/fill", color=_WRONG, dimensions=told.size, opacity=_FILL)
             scene.add_line_segments(
                 f"{node}/outline", _edges(told), _WRONG, thickness=_LINE, thickness_units="screen"
             )
         else:
+            scene.add_icosphere(f"{node}/fill", radius=told.radius, color=_WRONG, opacity=_FILL)
             scene.add_icosphere(
-                f"{node}/fill", radius=told.radius, color=_WRONG, opacity=_FILL, cast_shadow=False
-            )
-            scene.add_icosphere(
-                f"{node}/outline",
-                radius=told.radius,
-                color=_WRONG,
-                subdivisions=2,
-                wireframe=True,
-                cast_shadow=False,
+                f"{node}/outline", radius=told.radius, color=_WRONG, subdivisions=2, wireframe=True
             )
         # The reported obstacle is named at its foot and the true obstacle at its top. The names do not hide
         # each other.

@@ -9,8 +9,8 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.client.pending_edit import Send
 from app.html.palette import BAD
+from app.tab.mirror import Send
 from app.view.robot import RobotView
 from lessons.events import Push
 from robots import PlantSettings, Robot

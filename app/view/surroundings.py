@@ -40,15 +40,9 @@ class People:
         scene, node, colour = self._scene, f"/person/{index}", JOINTS[(index + 3) % len(JOINTS)]
         place = np.array([*person.place, 0.0])
         figure = scene.add_frame(node, show_axes=False, position=place)
-        scene.add_cylinder(
-            f"{node}/body", _WIDE, _TALL, color=colour, position=(0, 0, 0.5 * _TALL), cast_shadow=False
-        )
+        scene.add_cylinder(f"{node}/body", _WIDE, _TALL, color=colour, position=(0, 0, 0.5 * _TALL))
         scene.add_icosphere(
-            f"{node}/head",
-            radius=_HEAD,
-            color=(225, 190, 165),
-            position=(0, 0, _TALL + 0.8 * _HEAD),
-            cast_shadow=False,
+            f"{node}/head", radius=_HEAD, color=(225, 190, 165), position=(0, 0, _TALL + 0.8 * _HEAD)
         )
         shoulder, hand = np.array([0.0, 0.0, 0.85 * _TALL]), np.array(person.hand) - place
         arm = np.array([[shoulder, hand - [0.0, 0.0, _BALL_RADIUS]]], np.float32)
@@ -58,11 +52,7 @@ class People:
             away = 0.35 * hand[:2] / max(float(np.linalg.norm(hand[:2])), 1e-6)
             beside = 0.13 * (k - 0.5 * (person.balls - 1)) * np.array([-away[1], away[0]]) / 0.35
             scene.add_icosphere(
-                f"{node}/got{k}",
-                radius=_BALL_RADIUS,
-                color=_BALL,
-                position=(*(away + beside), _BALL_RADIUS),
-                cast_shadow=False,
+                f"{node}/got{k}", radius=_BALL_RADIUS, color=_BALL, position=(*(away + beside), _BALL_RADIUS)
             )
         return figure
 
@@ -71,9 +61,7 @@ class Carried:
     """The ball in the robot's hand."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        self._ball = scene.add_icosphere(
-            "/carried", radius=_BALL_RADIUS, color=_BALL, visible=False, cast_shadow=False
-        )
+        self._ball = scene.add_icosphere("/carried", radius=_BALL_RADIUS, color=_BALL, visible=False)
 
     def follow(self, tip: np.ndarray, carried: bool) -> None:
         """tip (3,): the position of the hand, m."""
@@ -129,13 +117,11 @@ def _drawn(scene: viser.SceneApi, name: str, thing: Thing) -> viser.SceneNodeHan
     position, wxyz = pose[:3], pose[3:]
     match thing.shape:
         case Ball(_, _, radius):
-            return scene.add_icosphere(name, radius, colour, position=position, cast_shadow=False)
+            return scene.add_icosphere(name, radius, colour, position=position)
         case Box(_, _, size):
-            return scene.add_box(
-                name, colour, dimensions=size, position=position, wxyz=wxyz, cast_shadow=False
-            )
+            return scene.add_box(name, colour, dimensions=size, position=position, wxyz=wxyz)
         case Post(_, _, height, radius):
-            return scene.add_cylinder(name, radius, height, colour, position=position, cast_shadow=False)
+            return scene.add_cylinder(name, radius, height, colour, position=position)
         case Floor():
             return None
 

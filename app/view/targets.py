@@ -4,7 +4,7 @@ targets of all tasks that `app.view.drag.Hand` does not handle."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,14 +13,56 @@ import pinocchio as pin
 import viser
 import viser.transforms as vtf
 
-from app.client.pending_edit import HOLD, Send
 from app.html.palette import BOUND, RGB
-from app.link.messages import TaskView
+from app.link.messages import Ready, TaskView
 from app.tab.context import PageContext
-from app.view.coordinates import draggable, full, of_task, xyzw
+from app.tab.mirror import HOLD, Send
 from app.view.robot import gizmo_size, target_radius
 from lessons.events import MoveTarget
 from robots import Robot
+
+
+def in_order(ready: Ready) -> list[TaskView]:
+    return list({task.level: task for task in ready.tasks}.values())
+
+
+def draggable(tasks: tuple[TaskView, ...]) -> tuple[TaskView | None, TaskView | None]:
+    """Returns the first position target of the stack, and an orientation target of the same frame."""
+    position = next((t for t in tasks if t.kind == "position" and t.raw is not None), None)
+    if position is None:
+        return None, None
+    orientation = next(
+        (t for t in tasks if t.kind == "orientation" and t.raw is not None and t.frame == position.frame),
+        None,
+    )
+    return position, orientation
+
+
+def raw(task: TaskView) -> np.ndarray:
+    assert task.raw is not None
+    return task.raw
+
+
+def full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.ndarray:
+    """Returns the point `else_` with `values` as its controlled coordinates. Values from before a change of
+    the task's axes have another number of coordinates and are ignored."""
+    point = np.array(else_, float)
+    if values is not None and values.shape == (len(task.axes),):
+        point[["xyz".index(axis) for axis in task.axes]] = values
+    return point
+
+
+def of_task(task: TaskView, targets: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Returns the position or rotation of a draggable task's target; None if there is no target. None also if
+    the target has other coordinates, after a change of the task's axes, its kind or the stack."""
+    found = targets.get(task.name)
+    return None if found is None or found.shape != raw(task).shape else found
+
+
+def xyzw(rotation: np.ndarray) -> tuple[float, ...]:
+    w, x, y, z = vtf.SO3.from_matrix(rotation).wxyz
+    return float(x), float(y), float(z), float(w)
+
 
 _DISC = 0.09  # m
 OPACITY = 0.5
@@ -165,11 +207,9 @@ class _Target:
         self._control = self._handle.control
         mark = f"{node}/control/mark"
         if flat:
-            scene.add_box(
-                mark, color=colour, dimensions=(0.006, _DISC, _DISC), opacity=OPACITY, cast_shadow=False
-            )
+            scene.add_box(mark, color=colour, dimensions=(0.006, _DISC, _DISC), opacity=OPACITY)
         elif not turning:
-            scene.add_icosphere(mark, radius=radius, color=colour, opacity=OPACITY, cast_shadow=False)
+            scene.add_icosphere(mark, radius=radius, color=colour, opacity=OPACITY)
         above = (0.65 if turning or "z" not in along else 1.0) * size + 0.04
         scene.add_label(f"{node}/control/label", task.name, position=(0.0, 0.0, above))
         self._gap = Gap(scene, f"/gaps/{task.name}", colour, 0.005, radius)

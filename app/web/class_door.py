@@ -51,7 +51,7 @@ class ClassDoor:
 
     def answer(self, door: Door, request: Request, who: str, address: str | None) -> Answer | Served:
         """Returns the response to a request. The request must name this server and come from one of its
-        pages. who: identifies the sender, see `app.web.peers`; address: the address of the client, None if
+        pages. who: identifies the sender, see `app.web.passes`; address: the address of the client, None if
         it is unknown."""
         plain, host = urlsplit(request.path).path, request.headers["Host"]
         past = door.not_by_the_proxy(request)

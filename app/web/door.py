@@ -14,8 +14,7 @@ from urllib.parse import parse_qs, quote, urlencode, urlsplit
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from app.web.passes import QUERY, USER_HEADER, Passes, Role
-from app.web.peers import came_through_a_proxy
+from app.web.passes import QUERY, USER_HEADER, Passes, Role, came_through_a_proxy
 from robots import InputError
 
 _HOST = re.compile(r"(?P<name>\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(?::(?P<port>\d{1,5}))?")
@@ -69,7 +68,7 @@ class Door:
     def judge(self, request: Request, who: str = "") -> Answer | None:
         """Returns None if the request is admitted, else the response to send. An admitted request names this
         server as its host. If the browser names the page that sent the request, this page must be one of
-        ours. who: identifies the sender, see `app.web.peers`."""
+        ours. who: identifies the sender, see `app.web.passes`."""
         return self.refuses(request) or self._ask_token(request, request.headers["Host"], who)
 
     def refuses(self, request: Request) -> Answer | None:
@@ -297,7 +296,6 @@ def plain(status: HTTPStatus, kind: str, text: str, more: tuple[tuple[str, str],
 
 
 def as_response(answer: Answer) -> Response:
-    """Returns the response as a complete HTML page."""
     body = _PAGE.format(title=escape(answer.title), text=answer.text).encode()
     headers = Headers(answer.headers)
     headers["Content-Type"] = "text/html; charset=utf-8"

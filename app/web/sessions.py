@@ -113,7 +113,6 @@ class Sessions:
                     self._spares.refill()
 
     def close(self) -> None:
-        """Ends all simulation processes."""
         self._closed.set()
         self._keeper.join()
         with self._lock:
@@ -160,21 +159,9 @@ def _of_the_session(name: str) -> property:
 
 
 for _name in (
-    *("ready", "status", "settings", "failure", "changed", "tape", "score", "record", "choice", "lecture"),
-    *(
-        "ghost",
-        "pid",
-        "quiet",
-        "trouble",
-        "settings_of",
-        "choice_of",
-        "lecture_of",
-        "read",
-        "look",
-        "ask",
-        "code",
-        "compiles",
-    ),
+    *("ready", "status", "settings", "failure", "changed", "tape", "figures", "record", "choice", "lecture"),
+    *("ghost", "pid", "quiet", "trouble", "settings_of", "choice_of", "lecture_of", "read", "look", "ask"),
+    *("code", "compiles"),
 ):
     setattr(Watcher, _name, _of_the_session(_name))
 for _name in ("send", "start_ghost", "stop_ghost", "reset_all", "load", "restart"):
@@ -230,6 +217,5 @@ class Classroom:
             return self._pages
 
     def close(self) -> None:
-        """Ends the simulation process."""
         self._learner.close()
         self._spares.close()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from app.link.messages import ContactPoint, Inside, InsideRequest, MissionView, OwnCode, TaskView
+from app.link.messages import InsideRequest, TaskView
 from himpc.plan import Binding
 from himpc.tasks import PlaneDistance, Task
 from himpc.tasks.kinds import kind_name
@@ -15,9 +15,6 @@ from robots.world import World
 
 LISTED = 24
 """Largest number of active constraints sent to the page. Nobody can read more in a tenth of a second."""
-
-TOUCHING = 24
-"""Largest number of contact points sent to the page."""
 
 
 class SessionReport(ABC):
@@ -31,10 +28,11 @@ class SessionReport(ABC):
         self.session = session
         self.watch = InsideRequest()
 
-    def own(self) -> OwnCode | None:
-        """Returns the state of a controller from a file; None for a controller of the lab. Code that was
-        saved since the last call takes effect."""
-        return None
+    def extras(self, running: bool, ran: bool) -> dict[str, Any]:
+        """Returns the fields of `Status` that only one level has. running: whether simulated time passes;
+        ran: whether there was a tick since the start. Code that was saved since the last call takes
+        effect."""
+        return {}
 
     def tasks(self) -> tuple[TaskView, ...]:
         """Returns the data of the tasks that the page needs."""
@@ -77,38 +75,6 @@ class SessionReport(ABC):
         """Returns active constraints of the last plan, at most LISTED."""
         return tuple(self.session.binding()[:LISTED])
 
-    def gauge(self) -> tuple[float, float] | None:
-        """Norm and spectral radius of I − M⁻¹M̄, if the controller has an M̄."""
-        return None
-
-    def ranks(self) -> dict[str, tuple[int, int]]:
-        """Returns, per level, the number of directions that are available at the present posture, and the
-        number of rows; empty without a stack."""
-        return {}
-
     def world(self) -> World:
         """Returns the objects around the robot."""
         return ()
-
-    def contacts(self) -> tuple[ContactPoint, ...]:
-        """Returns the points of contact after the last tick, at most TOUCHING."""
-        return ()
-
-    def objects(self) -> np.ndarray:
-        """Returns the poses of the free objects of the world, (k, 7): position, m, and quaternion (w, x, y,
-        z)."""
-        return np.zeros((0, 7))
-
-    def nearest(self) -> str:
-        """Returns the names of the nearest pair of links, or of a link and an object; "" if no distance is
-        measured."""
-        return ""
-
-    def mission(self) -> MissionView | None:
-        """Returns the state of the mission, if there is one."""
-        return None
-
-    def inside(self) -> Inside | None:
-        """Returns the data of the last tick that `watch` requests; None if nothing is requested or
-        available."""
-        return None

@@ -443,16 +443,9 @@ class SimulationRunner:
             binding=run.binding() if ran else (),
             notices=notices,
             settings=None if settings is sent else settings,
-            gauge=None if self.running else run.gauge(),
-            mission=run.mission(),
             lecture=None if self.lecturer is None else self.lecturer.report(),
-            inside=run.inside() if ran else None,
-            own=run.own(),
-            ranks=run.ranks(),
-            contacts=run.contacts(),
-            objects=run.objects(),
-            nearest=run.nearest(),
             code=self._code.news(settings) if coded else None,
+            **run.extras(self.running, ran),
         )
 
     def close(self) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import threading
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
 from app.link.messages import ContactPoint, Inside, InsideRequest, OwnCode
-from app.worker.report import TOUCHING, SessionReport
+from app.worker.report import SessionReport
 from lessons.geometry.look import matrix_of, plane_of
 from lessons.own.files import Stamp, is_file, read, stamp
 from lessons.own.judge import judged
@@ -77,6 +77,10 @@ class _Test(threading.Thread):
             self.fault = str(error)
 
 
+TOUCHING = 24
+"""Largest number of contact points sent to the page."""
+
+
 @final
 class TorqueRun(SessionReport):
     """The data of a torque-level session, see `app.worker.report.SessionReport`."""
@@ -87,8 +91,20 @@ class TorqueRun(SessionReport):
         super().__init__(session)
         self._file = File()
 
-    def own(self) -> OwnCode | None:
-        return self._file.look(self.session)
+    def extras(self, running: bool, ran: bool) -> dict[str, Any]:
+        session, mechanics = self.session, None if running else self._mechanics()
+        touching = session.plant.contacts[:TOUCHING]
+        return {
+            "gauge": None if mechanics is None else convergence_gauge(*mechanics),
+            "inside": self._inside() if ran else None,
+            "own": self._file.look(session),
+            "ranks": session.ranks() if np.isfinite(session.plant.q).all() else {},
+            "contacts": tuple(
+                ContactPoint(each.between, _point(each.position), _point(each.force)) for each in touching
+            ),
+            "objects": session.plant.objects(),
+            "nearest": session.clearance.nearest.pair,
+        }
 
     def targets(self) -> dict[str, np.ndarray]:
         found = {task.name: self.session.target(task.name) for task in self.session.layout.tasks}
@@ -97,28 +113,10 @@ class TorqueRun(SessionReport):
     def path(self) -> np.ndarray:
         return np.array(self.session.predicted_path())
 
-    def ranks(self) -> dict[str, tuple[int, int]]:
-        finite = np.isfinite(self.session.plant.q).all()
-        return self.session.ranks() if finite else {}
-
     def world(self) -> World:
         return self.session.scene.world
 
-    def contacts(self) -> tuple[ContactPoint, ...]:
-        found = self.session.plant.contacts[:TOUCHING]
-        return tuple(ContactPoint(each.between, _point(each.position), _point(each.force)) for each in found)
-
-    def objects(self) -> np.ndarray:
-        return self.session.plant.objects()
-
-    def nearest(self) -> str:
-        return self.session.clearance.nearest.pair
-
-    def gauge(self) -> tuple[float, float] | None:
-        found = self._mechanics()
-        return None if found is None else convergence_gauge(*found)
-
-    def inside(self) -> Inside | None:
+    def _inside(self) -> Inside | None:
         session, watch = self.session, self.watch
         if watch == InsideRequest():
             return None

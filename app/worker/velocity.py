@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -59,7 +59,10 @@ class VelocityRun(SessionReport):
         corners = [np.array([x, y, 0.0]) for x in (-_AROUND, _AROUND) for y in (-_AROUND, _AROUND)]
         return np.array([*goals, *corners])
 
-    def mission(self) -> MissionView:
+    def extras(self, running: bool, ran: bool) -> dict[str, Any]:
+        return {"mission": self._mission()}
+
+    def _mission(self) -> MissionView:
         session, progress = self.session, self.session.progress
         completed = dict(progress.completed)
         active = {each.task.name: each for each in progress.window}

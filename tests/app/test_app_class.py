@@ -365,7 +365,7 @@ def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -
 
 def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: dict[str, Any] = {}
-    monkeypatch.setattr("app.web.server.PageServer", lambda _, **options: asked.update(options))
+    monkeypatch.setattr("app.web.server.PageServer", lambda _, options: asked.update(vars(options)))
     monkeypatch.setattr("app.web.serving.serve", lambda _, **options: 0)
     for given, names in (([], None), (["--class"], True), (["--class", "--no-names"], False)):
         assert main(["--no-browser", *given]) == 0

@@ -53,7 +53,7 @@ def test_watchers_have_what_pages_use() -> None:
     """`Watcher` has every attribute of a learner that the code of a page uses."""
     used = {
         found
-        for folder in ("page", "panels", "view", "client/moment.py")
+        for folder in ("page", "panels", "tab", "view", "client/moment.py")
         for path in ([ROOT / folder] if folder.endswith(".py") else (ROOT / folder).rglob("*.py"))
         for found in re.findall(r"\blearner\.([a-z]\w*)", path.read_text())
     }

@@ -124,8 +124,8 @@ def test_a_ghost_begins_follows_and_ends(start: Start) -> None:
     assert ghost.settings is not None and ghost.settings.horizon == 1
     learner.send(Play(False))
     assert wait_until(lambda: together(learner), LONG)
-    mine = learner.score.result() if learner.score else None
-    its = ghost.score.result() if ghost.score else None
+    mine = learner.figures
+    its = ghost.figures
     assert mine is not None and its is not None and mine.seconds == pytest.approx(its.seconds, abs=1e-9)
     pid, before = ghost.pid, rings()
     learner.stop_ghost()

@@ -191,12 +191,11 @@ def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
 
 @pytest.fixture(scope="module")
 def run(body: SimulationRunner) -> Recorded:
-    record = RowHistory(body.session.layout)
-    history = History(body.block, body.session.layout, record.take)
+    history = History(body.block, body.session.layout)
     for _ in range(6):
         body.tick(50)
         history.pull()
-    return Recorded(record.layout, record.whole())
+    return Recorded(history.layout, history.rows.whole())
 
 
 def test_files_hold_what_was_recorded(body: SimulationRunner, run: Recorded) -> None:

@@ -16,7 +16,7 @@ from app.html.text import free_name
 from app.link.choice import SceneChoice
 from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, StepTicks
 from app.panels.run.plots import PlotsPanel, velocity_plots
-from app.panels.velocity.tasks import RolesPanel
+from app.panels.velocity.mission import RolesPanel
 from app.view.goals import open_row
 from app.worker.main import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
@@ -286,7 +286,7 @@ def test_a_level_has_its_name_on_the_page_as_it_is(
     assert isinstance(settings, VelocitySettings)
     tasks = [replace(level.tasks[0], name=f"<{level.name}>") for level in settings.levels]
     page.settings = MagicMock(levels=[Level((task,)) for task in tasks])
-    monkeypatch.setattr("app.panels.velocity.tasks.Controls", MagicMock())
+    monkeypatch.setattr("app.panels.velocity.mission.Controls", MagicMock())
     RolesPanel(page, None)
     labels = [call.args[0] for call in page.gui.add_folder.call_args_list if call.args[0]]
     assert labels == ["Settings of <ee>", "Settings of <base>"]

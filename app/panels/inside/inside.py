@@ -9,9 +9,8 @@ from dataclasses import replace
 from app.client.moment import Moment
 from app.html.text import block
 from app.link.messages import Inside, InsideRequest, Status
-from app.panels.inside.matrix import MatrixPanel
+from app.panels.inside.matrix import MatrixPanel, SpectrumPicture
 from app.panels.inside.plane import PlanePanel
-from app.panels.inside.spectrum import SpectrumPicture
 from app.tab.context import PageContext
 from lessons.settings.torque import TorqueSettings
 
@@ -63,7 +62,6 @@ class InsidePanel:
         self._spectrum.draw(moment.status.inside)
 
     def write(self, status: Status, settings: TorqueSettings) -> None:
-        """Updates the texts about the pictures."""
         if self._plane is not None:
             self._plane.write(status.inside, settings)
         self._matrix.write(status.inside)

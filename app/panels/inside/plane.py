@@ -326,7 +326,6 @@ class PlanePanel:
         )
 
     def draw(self, moment: Moment) -> None:
-        """Draws the data of an instant."""
         inside = moment.status.inside
         plane = None if inside is None else inside.plane
         if plane is None or not self._picture.in_view:

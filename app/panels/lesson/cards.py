@@ -169,7 +169,6 @@ def glyph(name: str) -> str:
 
 
 def exercise_cards() -> str:
-    """Returns the cards of all exercises, in order."""
     said = (
         f"<b>{len(EXERCISES)} exercises</b>: write the missing lines of a controller in a file of your own. "
         "This page runs the file whenever you save it. The last command judges the robot's motion."
@@ -184,7 +183,6 @@ def belonging_to(lesson: str) -> str:
 
 
 def card(exercise: Exercise) -> str:
-    """Returns the card of one exercise."""
     lesson = load_lesson(exercise.lesson).card.title
     lines = "<br>".join(f"<code>{esc(each)}</code>" for each in exercise.commands())
     return block(

@@ -99,7 +99,6 @@ def state(part: Part, lecture: Lecture, best: float | None) -> str:
 
 
 def why(part: Part) -> str:
-    """Returns the explanation of the result."""
     if isinstance(part, Challenge):
         return ""
     first, rest = split(part.why, min(_WHY, _AFTER - _result_words(part)))
@@ -109,7 +108,6 @@ def why(part: Part) -> str:
 
 
 def now_you(part: Part, lecture: Lecture) -> str:
-    """Returns what the learner can do now."""
     if isinstance(part, Challenge):
         return ""
     return block(f"<b>Now you:</b> {rendered_line(part.do)}")

@@ -188,7 +188,6 @@ class Asking:
 
 
 def _label(choice: Choice, place: int, mine: Answer | None, truth: float) -> str:
-    """Returns the words on the button of an option."""
     right = choice.right(truth)
     marks = [] if right is None or place not in (mine, right) else ["✓" if place == right else "✗"]
     marks += ["your answer"] if place == mine else []

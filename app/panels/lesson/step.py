@@ -163,7 +163,6 @@ class LessonPanel:
         self._page.send(Predict(answer))  # pyright: ignore[reportArgumentType]
 
     def run(self) -> None:
-        """Runs the step's script from its start."""
         lecture, asking = self._lecture, self._asking
         if asking is not None and lecture is not None and lecture.answer is None:
             suggested = asking.suggested
@@ -189,7 +188,6 @@ class LessonPanel:
     # ---------------------------------------------------------------- showing
 
     def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
-        """Updates the progress of the exercise."""
         if lecture is None:
             return
         if lecture.exercise != self._exercise:
@@ -280,7 +278,6 @@ class Course:
         self._page.choose(choice)
 
     def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
-        """Updates the progress of the lesson."""
         if self._panel is not None:
             self._panel.follow(lecture, settings)
 

@@ -117,8 +117,7 @@ class ComparePanel:
         self._start.label = "Start again with these" if on else "Start the ghost"
         if ghost is None:
             return
-        mine = None if self._learner.score is None else self._learner.score.result()
-        its = None if ghost.score is None else ghost.score.result()
+        mine, its = self._learner.figures, ghost.figures
         if its is None or mine is None or ghost.status is None:
             self._table.content = block(f"{badge('GHOST', GHOST)} is starting …")
             return

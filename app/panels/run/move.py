@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import viser
 
-from app.client.pending_edit import HOLD
-from app.panels.widgets.command import on_click
+from app.panels.widgets.command import on_change, on_click
 from app.panels.widgets.controls import in_colours_of_axes
+from app.tab.mirror import HOLD
 from app.view.targets import Movable
 
 _STEPS = {"1 mm": 1e-3, "1 cm": 1e-2, "5 cm": 5e-2}
@@ -53,11 +53,7 @@ class MovePanel:
             )
             gui.add_html(in_colours_of_axes(self._turn))
         for field in self._fields:
-
-            @field.on_update
-            async def _(event: viser.GuiEvent[viser.GuiNumberHandle[float]]) -> None:
-                if event.client is not None:
-                    self._moved()
+            on_change(field, self._moved)
 
         @self._step.on_update
         async def _(_: object) -> None:

@@ -8,16 +8,14 @@ import time
 from contextlib import nullcontext
 from functools import partial
 
-import viser
-
 from app.adapter.private import unless_removed
-from app.client.pending_edit import HOLD, PendingEdit
 from app.client.simulation import Trouble
 from app.html.palette import LEVELS, ink
 from app.html.text import block, esc, in_trouble
 from app.link.messages import Play, Post, Speed, Status, StepTicks
-from app.panels.widgets.command import add_command, on_click
+from app.panels.widgets.command import add_command, on_change, on_click
 from app.tab.context import PageContext, SessionSnapshot
+from app.tab.mirror import HOLD, PendingEdit
 from lessons.events import Reset
 from lessons.settings.settings import SceneSettings
 
@@ -63,11 +61,11 @@ class PlaybackPanel:
         on_click(self._buttons, lambda: self._click(str(self._buttons.value)))
         self._again.on_click(lambda _: page.learner.restart())  # on a thread, as it starts a process
 
-        @self._speed.on_update
-        async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-            if event.client is not None:
-                self._touched = time.monotonic()
-                page.send(Speed(float(self._speed.value)))
+        def choose_speed() -> None:
+            self._touched = time.monotonic()
+            page.send(Speed(float(self._speed.value)))
+
+        on_change(self._speed, choose_speed)
 
         for label, key, choice in (
             ("Run or pause", "space", _RUN),
@@ -173,11 +171,7 @@ class TimeLine:
         self._live = gui.add_button("Back to now", visible=False)
         self._words = gui.add_html("", visible=False)
 
-        @self._slider.on_update
-        async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-            if event.client is not None:
-                self._look(float(self._slider.value))
-
+        on_change(self._slider, lambda: self._look(float(self._slider.value)))
         on_click(self._live, lambda: self._set(0.0))
 
         for words, key, shift, seconds in (

@@ -9,7 +9,7 @@ import viser
 
 from app.html.palette import BAD, GOOD
 from app.html.text import bar, block, esc, formula, joint_labels
-from app.panels.inside.spectrum import SpectrumPicture
+from app.panels.inside.matrix import SpectrumPicture
 from app.panels.widgets.controls import Controls
 from app.tab.context import PageContext, SessionSnapshot
 from lessons.settings.torque import TorqueSettings

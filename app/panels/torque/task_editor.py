@@ -81,31 +81,25 @@ class AddTask:
         with gui.add_folder("Add a task", expand_by_default=False, order=899.0):
             self._kind = gui.add_dropdown("Kind", (*KINDS, *own), initial_value="position")
             self._says = gui.add_html("")
-            with gui.add_folder(None):
-                self._frame = gui.add_dropdown(
-                    "Of frame",
-                    tuple(robot.frames),
-                    initial_value=robot.tip,
-                    hint="You can also click a link, see below",
-                )
+
+            def menu(label: str, options: Sequence[str], first: str, hint: str | None = None) -> Any:
+                with gui.add_folder(None):
+                    return gui.add_dropdown(label, tuple(options), initial_value=first, hint=hint)
+
+            frames, places = robot.frames, _places(stack)
+            self._frame = menu("Of frame", frames, robot.tip, "You can also click a link, see below")
             with gui.add_folder(None):
                 self._pick = gui.add_checkbox(
                     "Click a link",
                     False,
                     hint="While this is on, a click on a link of the robot chooses the link",
                 )
-            with gui.add_folder(None):
-                self._root = gui.add_dropdown("As seen from", tuple(robot.frames))
-            with gui.add_folder(None):
-                self._axes = gui.add_dropdown("Along axes", AXES)
-            with gui.add_folder(None):
-                self._axis = gui.add_dropdown("Its axis", DIRECTIONS, initial_value="z")
-            with gui.add_folder(None):
-                self._normal = gui.add_dropdown("Plane across", tuple(_NORMALS))
-            with gui.add_folder(None):
-                self._joint = gui.add_dropdown("Of joint", tuple(self._joints))
-            with gui.add_folder(None):
-                self._level = gui.add_dropdown("On level", _places(stack), initial_value=_places(stack)[1])
+            self._root = menu("As seen from", frames, frames[0])
+            self._axes = menu("Along axes", AXES, AXES[0])
+            self._axis = menu("Its axis", DIRECTIONS, "z")
+            self._normal = menu("Plane across", tuple(_NORMALS), next(iter(_NORMALS)))
+            self._joint = menu("Of joint", tuple(self._joints), next(iter(self._joints)))
+            self._level = menu("On level", places, places[1])
             with gui.add_folder(None):
                 self._name = gui.add_text("Its name", "", hint="If empty, the name of the kind")
             self._add = gui.add_button("Add")

@@ -9,14 +9,13 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.client.pending_edit import PendingEdit
 from app.html.palette import DAMPING
 from app.html.text import block, esc, formula, joints_named, swatch
 from app.panels.torque.task_editor import AddTask, TaskEditor
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.level_row import DOWN, MORE, UP, LevelRow, error_in_words
 from app.tab.context import PageContext, SessionSnapshot
-from app.tab.mirror import Bindings
+from app.tab.mirror import Bindings, PendingEdit
 from himpc.stack import Level
 from himpc.tasks import Joints, Posture
 from lessons.events import Event, MoveLevel, MoveTarget, Set

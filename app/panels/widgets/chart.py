@@ -95,9 +95,9 @@ class Charts:
     """Charts in a folder. They are built anew when their titles or lines change, or when a ghost starts or
     ends."""
 
-    def __init__(self, page: PageContext) -> None:
-        self._page, self._folder = page, page.gui.add_folder(None)
-        self._inside: viser.GuiFolderHandle | None = None
+    def __init__(self, page: PageContext, folder: viser.GuiFolderHandle | None = None) -> None:
+        """folder: where the charts are; None: here."""
+        self._page, self._folder = page, folder or page.gui.add_folder(None)
         self._charts: list[Chart] = []
         self._built: object = None
 
@@ -115,16 +115,10 @@ class Charts:
         return [*plot.curves(window), *plot.marked(window), *(() if ghost is None else plot.curves(ghost))]
 
     def _build(self, plots: Sequence[Plot], ghost: bool) -> None:
-        if self._inside is not None:
-            self._inside.remove()
+        for chart in self._charts:
+            chart.remove()
         with self._folder:
-            self._inside = self._page.gui.add_folder(None)
-        self._charts = []
-        with self._inside:
-            for plot in plots:
-                self._charts.append(Chart(self._page, plot, ghost))
-                if plot.note:
-                    self._page.gui.add_html(block(plot.note))
+            self._charts = [Chart(self._page, plot, ghost) for plot in plots]
 
 
 class Chart:
@@ -160,6 +154,7 @@ class Chart:
             padding=(6, 12, 0, 0),
         )
         self._note = page.gui.add_html(block(plot.empty), visible=False)
+        self._below = page.gui.add_html(block(plot.note)) if plot.note else None
 
     def show(self, window: PlotWindow, curves: Callable[[], Sequence[np.ndarray]]) -> None:
         """Shows the window. curves: returns the (2 · BUCKETS,) values of each line; called only while the
@@ -205,6 +200,11 @@ class Chart:
         """Shows a text below a chart that stays empty."""
         self._blank = self._blank + 1 if blank else 0
         self._note.visible = self._blank >= _PATIENCE
+
+    def remove(self) -> None:
+        for handle in (self._handle, self._note, self._below):
+            if handle is not None:
+                handle.remove()
 
     def _looks_the_same(self, kept: np.ndarray, values: np.ndarray) -> bool:
         if self._sent is None or not np.array_equal(kept, self._sent[0]):

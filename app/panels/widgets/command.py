@@ -36,6 +36,15 @@ def on_click(button: viser.GuiButtonHandle | viser.GuiButtonGroupHandle, does: C
         does()
 
 
+def on_change(handle: viser.GuiInputHandle[Any], does: Callable[[], object]) -> None:
+    """Calls `does` on viser's event loop when the browser changes the value of a control."""
+
+    @handle.on_update
+    async def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None:
+            does()
+
+
 class PopupWindow:
     """A window whose content is built each time it opens."""
 

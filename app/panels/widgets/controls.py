@@ -14,6 +14,7 @@ from app.adapter.names import NUMBER_BOX, ROW, SLIDER_LABEL
 from app.adapter.private import dom_id
 from app.html.palette import AXES, css, ink
 from app.html.text import figure
+from app.panels.widgets.command import on_change
 from app.tab.context import PageContext
 from app.tab.mirror import Bindings, scalar
 from lessons.events import Set
@@ -72,7 +73,6 @@ class Controls(Generic[S]):
         self._gui, self._bindings, self._settings = gui, bindings, settings
 
     def add(self, *paths: str) -> None:
-        """Adds a control for each path."""
         for path in paths:
             self.add_as(self._settings.setting(path))
 
@@ -220,10 +220,7 @@ def add_dark_switch(page: PageContext) -> None:
     """Adds the checkbox of the page's theme."""
     dark = page.gui.add_checkbox("Dark theme", page.dark)
 
-    @dark.on_update
-    async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
-        if event.client is not None:
-            page.theme(bool(dark.value))
+    on_change(dark, lambda: page.theme(bool(dark.value)))
 
 
 def add_control(

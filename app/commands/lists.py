@@ -1,4 +1,4 @@
-"""`himpc-lab robots`."""
+"""`himpc-lab scenes`, `controllers` and `robots`: lists, and the check of a robot."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from app.commands.output import print_table, write_json
+from app.commands.output import print_list, print_table, write_json
 
 RobotFile = Annotated[str | None, tyro.conf.arg(aliases=("--robot",), metavar="FILE")]
 """The option that names a robot."""
@@ -16,6 +16,28 @@ HeldJoints = Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg
 """The option that holds joints."""
 Tool = Annotated[str | None, tyro.conf.arg(metavar="X,Y,Z[,ROLL,PITCH,YAW]")]
 """The option that adds a tool."""
+
+
+def scenes(json: str | None = None) -> int:
+    """List the scenes.
+
+    Args:
+        json: write JSON to this file, or to standard output for "-".
+    """
+    from lessons.scenes.names import ALL_SCENES
+
+    return print_list("Scenes", "scene", ALL_SCENES, json)
+
+
+def controllers(json: str | None = None) -> int:
+    """List the controllers.
+
+    Args:
+        json: write JSON to this file, or to standard output for "-".
+    """
+    from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
+
+    return print_list("Controllers", "controller", CONTROLLERS | VELOCITY_CONTROLLERS, json)
 
 
 def robots(check: str | None = None, hold: HeldJoints = (), json: str | None = None) -> int:
