@@ -57,12 +57,12 @@ def ticks(low: float, high: float, about: int = 4) -> list[float]:
     ]
 
 
-def decades(low: float, high: float, most: int = 5) -> list[float]:
-    """Returns at most `most` powers of ten between two values above 0."""
+def decades(low: float, high: float) -> list[float]:
+    """Returns at most five powers of ten between two values above 0."""
     found = [
         10.0**k for k in range(math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9) + 1)
     ]
-    return found[:: -(-len(found) // most) or 1]
+    return found[:: -(-len(found) // 5) or 1]
 
 
 def tick_label(tick: float, log: bool) -> str:

@@ -100,8 +100,7 @@ class SceneView:
         plots = more if narrow else gui.add_panel()
         width, height = self._comfort.window or (0, 0)
         roomy = width >= _ROOMY[0] and height >= _ROOMY[1] and not self._level.opens_inside
-        if not narrow:
-            self._level.open_plots(plots)
+        inside = plots.add_tab("Inside") if self._level.opens_inside and not narrow else None
         with learn:
             self._course = Course(self.page, None if narrow else plots)
         with learn if exercise is None else robot:
@@ -132,7 +131,9 @@ class SceneView:
             self._level.add_plots()
         with plots.add_tab("Joints"):
             self._joint_plots = JointPlots(self.page, self._level.input)
-        self._level.add_inside(more if roomy else plots)
+        for title, add in self._level.more_plots:
+            with inside or (more if roomy else plots).add_tab(title):
+                add()
         with plots.add_tab("Who binds"):
             self._binding = BindingPanel(self.page)
         above = below = 0.0

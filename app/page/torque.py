@@ -3,6 +3,7 @@ plant."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -39,7 +40,6 @@ class TorqueView:
 
     def __init__(self, page: PageContext) -> None:
         self._page = page
-        self._inside_tab: viser.GuiTabHandle | None = None
         self._hands: list[Hand] = []
         """The dragged target, if the stack has a target that can be dragged."""
         self._stale: Status | None = None
@@ -62,19 +62,17 @@ class TorqueView:
 
     @property
     def opens_inside(self) -> bool:
-        """Whether the picture of a tick is what this scene is about: its tab then is the first one."""
         return self._page.settings.horizon == 1  # the QP is small enough for beginners
-
-    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        if self.opens_inside:
-            self._inside_tab = plots.add_tab("Inside")
 
     def add_plots(self) -> None:
         self._plots = PlotsPanel(self._page, torque_plots)
 
-    def add_inside(self, tabs: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        with self._inside_tab or tabs.add_tab("Inside"):
-            self._inside_place = self._page.gui.add_folder(None)
+    @property
+    def more_plots(self) -> tuple[tuple[str, Callable[[], None]], ...]:
+        return (("Inside", self._add_inside),)
+
+    def _add_inside(self) -> None:
+        self._inside_place = self._page.gui.add_folder(None)
         self._look_inside()
 
     def _look_inside(self) -> None:

@@ -3,6 +3,7 @@ obstacles."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
@@ -38,18 +39,21 @@ _AHEAD, _RADIUS = 0.7, 0.2
 
 class VelocityView:
     """The user interface of a velocity-level scene, a part of `app.page.scene_view.SceneView`. It is built by
-    `open_plots`, `add_start`, `add_tasks`, `add_control`, `add_plant`, `add_plots`, `add_inside` and
-    `add_scene`, in this order. `follow` is called for every frame, `draw` about ten times per second, and
-    `write` a few times per second.
+    `add_start`, `add_tasks`, `add_control`, `add_plant`, `add_plots`, `more_plots` and `add_scene`, in this
+    order. `follow` is called for every frame, `draw` about ten times per second, and `write` a few times per
+    second.
 
     Attributes:
         fastest: the highest useful speed of the simulation, simulated seconds per second.
         input: the input of the joints that is plotted.
+        opens_inside: whether the picture of a tick is what the scene is about: its tab then is the first one.
+        more_plots: titles of further tabs, each with the function that fills it.
     """
 
     fastest: ClassVar[float] = 10.0
     input: ClassVar[Input] = ACCELERATION
     opens_inside: ClassVar[bool] = False
+    more_plots: ClassVar[tuple[tuple[str, Callable[[], None]], ...]] = ()  # no picture of a tick
 
     def __init__(self, page: PageContext) -> None:
         self._page = page
@@ -74,15 +78,8 @@ class VelocityView:
     def add_plant(self) -> None:
         add_servo_plant(self._page)
 
-    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        """Adds the tab of the picture of a tick, which precedes the lesson's tab, if it is the first one. At
-        this level there is none: the compiled cascade does not show a tick."""
-
     def add_plots(self) -> None:
         self._plots = PlotsPanel(self._page, velocity_plots)
-
-    def add_inside(self, tabs: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        """Adds the picture of a tick, which is not known at this level."""
 
     def add_scene(self, robot: RobotView) -> None:
         """Adds all objects except the robot and the floor to the 3D view. robot: velocity servos do not react

@@ -189,9 +189,8 @@ class CoverView:
     """One translucent mesh per body. A mesh is a child of the body's frame and moves with the links of
     `RobotView`. Meshes are created when they are first shown."""
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot, root: str = "/robot") -> None:
-        """root: name of the robot's node."""
-        self._scene, self._robot, self._root = scene, robot, root
+    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+        self._scene, self._robot = scene, robot
         self._nodes: list[viser.MeshHandle] | None = None
         self._on = False
 
@@ -203,7 +202,7 @@ class CoverView:
         if self._nodes is None:
             self._nodes = [
                 self._scene.add_mesh_simple(
-                    f"{self._root}/{part.joint or 'base'}/cover",
+                    f"/robot/{part.joint or 'base'}/cover",
                     part.vertices,
                     part.faces,
                     color=part.colour,

@@ -35,12 +35,13 @@ from app.web.door import (
 )
 from app.web.inlet import refusal
 from app.web.limits import TRANSFER, Budget, ConnectionLimits, Uploads
-from app.web.load import PATHS, Load, Places, load_of, report
+from app.web.load import PATHS, Load, load_of, report
 from app.web.passes import ends_of
 from app.web.wrong_codes import DELAY, WrongCodes
 
 if TYPE_CHECKING:
     from app.web.class_door import ClassDoor, Served
+    from app.web.sessions import Classroom, Sessions
 
 _FIRST_LINE = re.compile(rb"([A-Z]{1,20}) ([^\s]+) HTTP/1\.([01])(?=\r\n)")
 _READ = ("GET", "HEAD")
@@ -234,13 +235,13 @@ class ConnectionGuard:
         """Number of messages that were passed on to viser."""
         self._door = door
         self._open = self._refers = False
-        self._places: Places | None = None
+        self._places: Sessions | Classroom | None = None
         self._class: ClassDoor | None = None
 
     def open(
         self,
         door: Door,
-        places: Places | None = None,
+        places: Sessions | Classroom | None = None,
         refers: bool = False,
         class_door: ClassDoor | None = None,
     ) -> None:

@@ -40,7 +40,7 @@ from lessons.replay.progress import LearnerProgress, load_progress
 from robots import InputError
 
 if TYPE_CHECKING:
-    from app.classes.room import Room
+    from app.classes.hall import Hall
     from app.web.class_file import ClassFile
 
 _KEY = "himpc-lab-place"
@@ -99,9 +99,9 @@ class Workers(ThreadPoolExecutor):
     """The threads of one page, on which its callbacks run without blocking other pages. Calls beyond their
     limit are dropped, and all calls after the shutdown."""
 
-    def __init__(self, threads: int = THREADS, waiting: int = WAITING) -> None:
-        super().__init__(threads, thread_name_prefix="page")
-        self._room = threading.Semaphore(threads + waiting)
+    def __init__(self) -> None:
+        super().__init__(THREADS, thread_name_prefix="page")
+        self._room = threading.Semaphore(THREADS + WAITING)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Submits a call; returns a future with the result None if the call is dropped."""
@@ -195,7 +195,7 @@ class Visit:
         client: viser.ClientHandle,
         sessions: Sessions | Classroom,
         options: ServerOptions,
-        room: Room | None = None,
+        room: Hall | None = None,
     ) -> None:
         """room: the class, if there is one."""
         self._server = server
@@ -293,7 +293,7 @@ class Visit:
         if watching is not None:  # the page has only watched so far
             watching.close()
         room = self._room
-        guide = room.guide if room is not None and self._teaches else None
+        guide = room.robot if room is not None and self._teaches else None
         leads = guide is not None
         entered = None
         if guide is None or isinstance(self._sessions, Classroom):

@@ -14,8 +14,7 @@ import pytest
 from served import served
 from test_app_class import LONG
 
-from app.classes.hall import Hall
-from app.classes.room import PATIENCE, BuildQueue
+from app.classes.hall import PATIENCE, BuildQueue, Hall
 from app.client import simulation_client
 from app.client.simulation_client import BEHIND, Rest, SimulationClient
 from app.link.choice import SceneChoice

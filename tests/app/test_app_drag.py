@@ -21,10 +21,9 @@ from app.link.exercise import Lecture, LessonPlace
 from app.link.messages import Post, Ready
 from app.panels.torque.start import StartPanel
 from app.view import drag
-from app.view.drag import Hand, paused_words
+from app.view.drag import Hand, Question, Reachability, ReachabilityWorker, paused_words
 from app.view.goals import Goal
 from app.view.obstacles import _Solid
-from app.view.reachability import Question, Reachability, ReachabilityWorker
 from app.view.robot import gizmo_size, target_radius
 from app.view.targets import Targets, draggable
 from app.worker.simulation import SimulationRunner

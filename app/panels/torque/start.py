@@ -12,7 +12,7 @@ from app.link.messages import TaskView
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import add_dark_switch, in_colours_of_axes
 from app.tab.context import PageContext, SessionSnapshot
-from app.view.reachability import Reachability
+from app.view.drag import Reachability
 from app.view.targets import draggable
 from himpc.stack import Level
 from lessons.events import Push, Set
