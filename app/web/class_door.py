@@ -13,13 +13,12 @@ from urllib.parse import urlsplit
 from websockets.http11 import Request
 
 from app.classes.hall import Hall
-from app.classes.pages import PageName, page, policy
-from app.classes.sockets import Sockets
+from app.classes.sockets import PageName, Sockets, page, policy
 from app.classes.views import table
 from app.classes.words import PHONES, TEACHER
 from app.web.door import NO_CLASS, Answer, Door, is_upgrade
+from app.web.limits import WrongCodes
 from app.web.passes import QUERY
-from app.web.wrong_codes import WrongCodes
 
 _TEACHER = f"/{TEACHER}"
 _NOT_KEPT = ("Cache-Control", "no-store")

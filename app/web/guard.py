@@ -34,10 +34,9 @@ from app.web.door import (
     under_its_name,
 )
 from app.web.inlet import refusal
-from app.web.limits import TRANSFER, Budget, ConnectionLimits, Uploads
+from app.web.limits import DELAY, TRANSFER, Budget, ConnectionLimits, Uploads, WrongCodes
 from app.web.load import PATHS, Load, load_of, report
 from app.web.passes import ends_of
-from app.web.wrong_codes import DELAY, WrongCodes
 
 if TYPE_CHECKING:
     from app.web.class_door import ClassDoor, Served

@@ -115,7 +115,7 @@ class Passes:
         return "".join(sign for sign in unquote(given[0])[:LONGEST_ACCOUNT] if sign.isprintable())
 
     def in_cookies(self, headers: Headers, who: str) -> Role | None:
-        """Returns the role whose cookie is in a request from `who`, see `app.web.passes`; None if there is
+        """Returns the role whose cookie is in a request from `who`, see `Ends.user`; None if there is
         none."""
         given = list(self._cookies(headers))
         right = {"guest": self._value("guest", who), "owner": self.owner and self._value("owner", who)}

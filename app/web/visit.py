@@ -344,7 +344,7 @@ class Visit:
 
     def _watch(self) -> None:
         """Checks every _PERIOD s, on viser's event loop, whether scene or settings have changed. If so, the
-        tab stores the page's new place (see `app.web.visit`), as the simulation reported it."""
+        tab stores the page's new place, as the simulation reported it."""
         if self._left or not isinstance(self._sessions, Sessions):
             return
         page = self._page

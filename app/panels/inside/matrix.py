@@ -133,7 +133,7 @@ def _legend(matrix: Matrix, names: Sequence[str]) -> str:
     )
 
 
-_EIGENVALUES = "Eigenvalues of I − M⁻¹M̄"
+EIGENVALUES = "Eigenvalues of I − M⁻¹M̄"
 _SPECTRUM_SIZE = (360, 208)
 _MIDDLE, _RADIUS = (180.0, 92.0), 78.0
 _EDGE = 2.2  # half the width of the picture, in radii of the unit circle
@@ -146,7 +146,7 @@ class SpectrumPicture:
         self._picture = SvgPicture(
             client,
             in_view,
-            _EIGENVALUES,
+            EIGENVALUES,
             _SPECTRUM_SIZE,
             "Run (Space), or take one tick (T), to see the eigenvalues.",
         )
