@@ -2,9 +2,9 @@
 
 The path of a dragged target from the browser to the tick:
 1. The browser sends the pose of the gizmo. `web/guard` counts the bytes, `web/inlet` refuses values that
-   a control cannot have, and viser calls back on its loop, in `view/drag`.
-2. `view/reachability`, on a thread of its own, computes the nearest pose that the robot can reach;
-   `view/drag` posts a `MoveTarget`.
+   a control cannot have, and viser calls back on its loop, in `view/targets`.
+2. `view/drag`, on a thread of its own, computes the nearest pose that the robot can reach, and posts a
+   `MoveTarget`.
 3. `client/simulation_client` puts the message into the outbox of `link/process`, which never waits. A thread
    sends it.
 4. `worker/main` reads the message and passes it to `worker/simulation`, which puts it into the session's
@@ -15,11 +15,11 @@ The path of a row of telemetry from the tick to the browser:
 1. A tick of the session returns the row; `worker/simulation` writes it into the shared memory of `link/ring`.
 2. The page's thread (`page/page`, 30 Hz) gets the time to show from `client/moment`, which reads the new
    rows.
-3. `client/decimated` keeps the minimum, the maximum and the last value of each column in each interval of
+3. `client/recording` keeps the minimum, the maximum and the last value of each column in each interval of
    time.
-4. `page/layout` gives the moment to `page/torque_ui` or `velocity_ui`, which draws the panels' curves.
+4. `page/scene_view` gives the moment to `page/torque` or `page/velocity`, which draws the panels' curves.
 5. viser sends the changes. Data that need not be sent every tick (settings, notices, the progress of a
-   lesson) are sent ten times a second as a `Status` over `link/connection`; `client/simulation` receives
+   lesson) are sent ten times a second as a `Status` over `link/process`; `client/simulation` receives
    them.
 """
 

@@ -29,7 +29,9 @@ COMMANDS: dict[str, str] = {
     "export": "export a controller as C or WebAssembly, with its numbers and a recorded run to replay",
     "tune": "find M̄ step by step, as Remark 4 of the HIMPC paper says",
 }
-"""One line per command; the function `NAME(…) -> exit code` is in `app/commands/NAME.py`."""
+"""One line per command; the function `NAME(…) -> exit code` is in `app/commands/NAME.py`, or in `LISTS`."""
+LISTS = ("scenes", "controllers", "robots")
+"""The commands in `app/commands/lists.py`."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -85,7 +87,8 @@ def _run(arguments: list[str]) -> int:
 def _call(name: str, arguments: list[str]) -> int:
     import tyro
 
-    command: Callable[..., int] = getattr(import_module(f"app.commands.{name}"), name)
+    module = "app.commands.lists" if name in LISTS else f"app.commands.{name}"
+    command: Callable[..., int] = getattr(import_module(module), name)
     prog = "himpc-lab" if name == "serve" else f"himpc-lab {name}"
     # Flags have no negative form: tyro would make --no-no-browser out of --no-browser.
     return tyro.cli(command, prog=prog, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))

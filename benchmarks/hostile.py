@@ -30,11 +30,11 @@ import msgspec
 import numpy as np
 from websockets.exceptions import ConnectionClosed
 
-from app.client.decimated import History
+from app.client.recording import History
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.ring import Block
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from browsing.wire import Wire, camera, eventually, pack
 from lessons.scenes.run_spec import RunSpec
 
@@ -89,7 +89,7 @@ def attack(scene: str, seconds: float, seed: int, pages: int = 4) -> Findings:
     fault."""
     found = Findings(seed)
     with StandardError() as terminal:
-        server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=pages, grace=0.2)
+        server = PageServer(SceneChoice(RunSpec(scene)), ServerOptions(port=0, max_sessions=pages, grace=0.2))
         try:
             user, judge = HostileUser(server, found), Judge(server, found)
             try:

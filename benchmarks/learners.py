@@ -26,7 +26,7 @@ import tyro
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from benchmarks.child import LONG
 from benchmarks.client import Viewers
 from browsing.viewer import CURVES
@@ -79,7 +79,7 @@ def served(
     run: RunSpec, clients: int, *options: str
 ) -> Iterator[tuple[PageServer, Viewers, Sequence[SimulationClient]]]:
     """Yields a server, its clients and its learners, as soon as all their robots have moved for 0.5 s."""
-    server = PageServer(SceneChoice(run), port=0, max_sessions=clients)
+    server = PageServer(SceneChoice(run), ServerOptions(port=0, max_sessions=clients))
     try:
         with Viewers(server.link, clients, *options) as viewers:
             assert wait_until(lambda: len(server.sessions.learners) == clients, LONG), "not all were admitted"

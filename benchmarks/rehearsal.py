@@ -36,8 +36,8 @@ from app.__main__ import main as himpc_lab
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.panels.widgets.controls import STEPS
-from app.panels.widgets.in_view import AWAKE, LABEL
-from app.web.server import PageServer
+from app.tab.in_view import AWAKE, LABEL
+from app.web.server import PageServer, ServerOptions
 from benchmarks.child import Child, tell
 from browsing.wire import Wire, eventually
 from lessons.replay.progress import read_key
@@ -188,8 +188,9 @@ def be_a_server(learners: int, lesson: str) -> None:
         (Path(folder) / "key.txt").write_text(KEY)
         # A robot that waits for its step needs no processor.
         server = PageServer(
-            SceneChoice.opening(lesson), port=0, max_sessions=learners, key=read_key(f"{folder}/key.txt"),
-            class_names=True, grace=60.0,
+            SceneChoice.opening(lesson),
+            ServerOptions(port=0, max_sessions=learners, key=read_key(f"{folder}/key.txt"), class_names=True,
+                          grace=60.0),
         )  # fmt: skip
         over, runs = threading.Event(), defaultdict[tuple[str, LessonPlace], list[float]](list)
         try:

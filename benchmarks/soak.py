@@ -43,7 +43,7 @@ from statistics import median
 
 import psutil
 
-from app.client.rows import MOST, RATE
+from app.client.recording import MOST, RATE
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load, Speed

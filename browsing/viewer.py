@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.panels.widgets.in_view import ASLEEP, AWAKE, LABEL
+from app.tab.in_view import ASLEEP, AWAKE, LABEL
 from browsing.tab import Storage, Tab
 
 CURVES = "Joints"

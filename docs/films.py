@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from app.html.palette import GHOST, level_colours
 from app.view.camera import fit
 from app.view.robot import RobotView, camera_for
-from app.worker.outlet import LinkPoses
+from app.worker.simulation import LinkPoses
 from lessons.teaching.lesson import Lesson
 from robots import Robot
 

@@ -15,7 +15,7 @@ from playwright.sync_api import Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
 from app.link.exercise import parts_of
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from browsing.lessons import expect_part, hurry, open_lesson, predict, run, title_of
 from lessons.course import COURSE, load_lesson
@@ -74,7 +74,7 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     expect.set_options(timeout=SLOW)
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)

@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page, press
 from browsing.lessons import expect_part, predict, run
 from lessons.teaching.lesson import Step
@@ -27,7 +27,7 @@ EVERY, LAST = 100, 1500
 
 def main() -> None:
     expect.set_options(timeout=SLOW)
-    server = PageServer(SceneChoice.of_lesson(EXERCISE), port=0, max_sessions=1)
+    server = PageServer(SceneChoice.of_lesson(EXERCISE), ServerOptions(port=0, max_sessions=1))
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)

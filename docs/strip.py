@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page, press, tab
 from browsing.lessons import expect_part, hurry, open_lesson, predict, run
 from docs.gallery import ROOT, look
@@ -78,7 +78,7 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
         for device in SIZES:
-            server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=1)
+            server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), ServerOptions(port=0, max_sessions=1))
             try:
                 pictures += shots(browser, server, device)
             finally:

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from nbclient import NotebookClient
 
-from app.jupyter.frame import Surroundings, outside, surroundings
-from app.jupyter.lab import Lab
+from app.jupyter.lab import Lab, Surroundings, outside, surroundings
 from app.link.choice import SceneChoice
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.html.curves import tick_label as label
+from app.html.svg import tick_label as label
 from app.worker.lecturer import BUCKETS, thinned
 from docs.pages.curves import FLOORS, figure
 

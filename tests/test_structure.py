@@ -27,13 +27,13 @@ DOORS = {
     "llvmlite": ("himpc/export/objects.py",),
     "casadi": ("himpc/qp.py",),
     "viser": ("app/",),
-    "segno": ("app/classes/pages.py",),
+    "segno": ("app/classes/sockets.py",),
     "tyro": ("app/",),
     "rich": ("app/",),
     "matplotlib": ("lessons/plots/",),
     "distributed": ("lessons/cluster.py",),
     "IPython": ("app/jupyter/lab.py",),
-    "jupyter_core": ("app/jupyter/frame.py",),
+    "jupyter_core": ("app/jupyter/lab.py",),
     "psutil": ("robots/processes/family.py",),
     "yourdfpy": ("robots/shapes/read.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
@@ -107,11 +107,12 @@ def test_himpc_is_tested_without_lessons_and_app() -> None:
 APP = {
     "commands": ("web", "html", "link", "__main__"),
     "jupyter": ("web", "client", "link"),
-    "web": ("classes", "page", "panels", "client", "html", "link", "worker", "adapter"),
+    "web": ("classes", "page", "panels", "tab", "client", "html", "link", "worker", "adapter"),
     "classes": ("client", "html", "link"),
-    "page": ("panels", "view", "client", "html", "link", "adapter"),
-    "panels": ("view", "client", "html", "link", "adapter"),
-    "view": ("client", "html", "link", "adapter"),
+    "page": ("panels", "view", "tab", "client", "html", "link", "adapter"),
+    "panels": ("view", "tab", "client", "html", "link", "adapter"),
+    "view": ("tab", "client", "html", "link", "adapter"),
+    "tab": ("client", "html", "link", "adapter"),
     "client": ("html", "link"),
     "worker": ("link",),
     "link": (),
@@ -152,8 +153,8 @@ def test_contributing_names_what_is_there() -> None:
 
 @pytest.mark.parametrize("folder", APP)
 def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
-    """Imports go in the direction commands → web → page → panels → view → client → link ← worker. A folder
-    imports only the folders that `APP` lists for it."""
+    """Imports go in the direction commands → web → page → panels → view → tab → client → link ← worker. A
+    folder imports only the folders that `APP` lists for it."""
     files = sources(f"app/{folder}")
     assert files
     wrong = {

@@ -5,13 +5,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 import io
 import socket
+import sys
 import threading
+import traceback
 import uuid
 import warnings
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import fields
+from functools import cache
 from http import HTTPStatus
 from typing import Any, Literal
 
@@ -22,10 +27,73 @@ import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from app.adapter.fast_messages import fast
-from app.adapter.removed_handle_errors import call
-from app.adapter.thread_safe_event import ThreadSafeEvent
 from robots import InputError
+
+_LATE = " on a removed "
+
+
+def is_removed_handle_error(error: BaseException) -> bool:
+    """Returns whether an exception is viser's refusal to write to a removed control or node. Such an
+    exception can be ignored, as the page does not show that control or node any more."""
+    return isinstance(error, RuntimeError) and _LATE in str(error)
+
+
+def unless_removed(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """Calls a function and returns its result; None if the function wrote to a removed control or node."""
+    try:
+        return fn(*args, **kwargs)
+    except RuntimeError as error:
+        if not is_removed_handle_error(error):
+            raise
+        return None
+
+
+def print_exception(future: Future[Any]) -> None:
+    """Callback for a finished future: prints the exception of a thread, which would otherwise be lost."""
+    if not future.cancelled() and (error := future.exception()) is not None:
+        traceback.print_exception(error, file=sys.stderr)
+
+
+async def call(back: Callable[[Any], Any], event: Any, threads: Executor) -> None:
+    """Calls a callback, on the event loop if it is a coroutine function. Exceptions are passed on."""
+    if inspect.iscoroutinefunction(back):
+        await back(event)
+    else:
+        threads.submit(back, event).add_done_callback(print_exception)
+
+
+class ThreadSafeEvent(asyncio.Event):
+    """An asyncio event that is always set on its event loop.
+
+    asyncio's own event must only be set on its loop. viser 1.1 sets the event of its sender directly from any
+    thread, and then asks the loop to set the event as well. Every few hours, the direct call occurs between
+    the sender's last check and its wait. The event is then set although the sender waits, and the loop's call
+    has no effect, so the page is never updated again. An event of this class ignores calls from other
+    threads, so that only the loop sets the event. A picture of many messages then wakes the sender once.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
+        self._home = loop
+
+    def set(self) -> None:
+        with contextlib.suppress(RuntimeError):  # the thread has no event loop
+            if asyncio.get_running_loop() is self._home:
+                super().set()
+
+
+@cache
+def fast(kind: type[Any]) -> type[Any]:
+    """Returns a subclass of a message class, for messages that contain only Python numbers, strings and
+    tuples of these. A moving robot sends about a hundred such messages per second. The subclass keeps the
+    class name, by which viser identifies a message."""
+    names = tuple(field.name for field in fields(kind))
+
+    def as_serializable_dict(self: Any, _: object = None) -> dict[str, Any]:
+        return {**{name: getattr(self, name) for name in names}, "type": kind.__name__}
+
+    return type(kind.__name__, (kind,), {"as_serializable_dict": as_serializable_dict})
+
 
 try:
     from viser import _messages, infra
@@ -74,7 +142,6 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
 
 
 def stop(server: viser.ViserServer) -> None:
-    """Stops the server without printing anything."""
     with _silent():
         server.stop()
 
@@ -196,7 +263,6 @@ async def read_storage(
 
 
 def run_script(client: viser.ClientHandle, source: str) -> None:
-    """Runs JavaScript in the page."""
     client._websock_connection.queue_message(_messages.RunJavascriptMessage(source))
 
 

@@ -10,8 +10,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from app.classes.gathering import MEMBERS, Gathering, Held, question_of
-from app.classes.member import NAME, Kind, Member
+from app.classes.gathering import MEMBERS, NAME, Gathering, Held, Kind, Member, question_of
 from app.link.exercise import LessonPlace
 from lessons.teaching.poll import ROUNDS, Poll, valid
 from robots import InputError
@@ -22,7 +21,7 @@ Count = Annotated[int, Meta(ge=0, le=100_000)]
 
 
 class SavedMember(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A member, see `app.classes.member.Member`. since: on the clock of the calendar, s."""
+    """A member, see `app.classes.gathering.Member`. since: on the clock of the calendar, s."""
 
     who: str
     number: Count
@@ -56,7 +55,6 @@ class SavedGathering(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def saved(state: Gathering) -> SavedGathering:
-    """Returns a class as data."""
     poll = None if state.poll is None or state.place is None else Held(state.place, state.poll, state.truth)
     return SavedGathering(
         None if state.place is None else _told(state.place),

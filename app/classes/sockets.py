@@ -1,20 +1,25 @@
-"""The connections of a class: phones that vote and watch, and the teacher's page. This code runs on the
-server's loop."""
+"""The two pages of a class, the teacher's and the phones', and their connections. The pages use no library,
+load no other files, and run only their own script. This code runs on the server's loop."""
 
 from __future__ import annotations
 
 import asyncio
+import base64
+import hashlib
+import io
 import json
+import time
 from collections.abc import Callable
-from typing import Any, Protocol
+from functools import cache, lru_cache
+from importlib.resources import files
+from typing import Any, Literal, Protocol
 
 import msgspec
+import segno
 from websockets.asyncio.server import broadcast
 from websockets.exceptions import ConnectionClosed
 
 from app.classes.hall import Hall
-from app.classes.newcomers import Newcomers
-from app.classes.pages import qr
 from app.classes.views import View
 from app.classes.words import (
     ONLY_HERE,
@@ -31,6 +36,77 @@ from app.classes.words import (
     of_teacher,
 )
 from robots import InputError
+
+PageName = Literal["phone", "teacher"]
+
+
+@cache
+def page(name: PageName) -> str:
+    return _file(f"{name}.html").replace("/*style*/", _style(name)).replace("/*script*/", _script(name))
+
+
+def policy(name: PageName, host: str) -> str:
+    """Returns the page's Content-Security-Policy. host: the server's name in the browser's request, for
+    browsers in which 'self' does not include web sockets."""
+    return (
+        f"default-src 'none'; script-src '{_digest(_script(name))}'; style-src '{_digest(_style(name))}'; "
+        f"connect-src 'self' ws://{host} wss://{host}; frame-ancestors 'none'; base-uri 'none'; "
+        "form-action 'none'"
+    )
+
+
+@lru_cache(maxsize=16)
+def qr(address: str) -> str:
+    drawn = io.BytesIO()
+    segno.make(address, error="m").save(
+        drawn, kind="svg", xmldecl=False, svgns=True, omitsize=True, border=2, light="#fff"
+    )
+    return drawn.getvalue().decode()
+
+
+def _style(name: PageName) -> str:
+    return _file("class.css") + _file(f"{name}.css")
+
+
+def _script(name: PageName) -> str:
+    return "".join(_file(each) for each in ("robot.js", "class.js", f"{name}.js"))
+
+
+def _digest(text: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+@cache
+def _file(name: str) -> str:
+    return (files("app.classes") / "web" / name).read_text(encoding="utf-8")
+
+
+PER_MINUTE = 400
+"""Largest number of new phones from one address in a minute: a whole lecture hall may be behind one
+address."""
+ADDRESSES = 1000
+"""Largest number of addresses that are remembered; those that have been silent longest are forgotten."""
+
+
+class Newcomers:
+    """Counts the phones that join, by address. An unknown address (behind a proxy) counts as one address."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """clock: returns the time, s."""
+        self._clock = clock
+        self._joined: dict[str | None, tuple[float, int]] = {}  # begin of the minute, and the number since
+
+    def admit(self, address: str | None) -> bool:
+        """Counts one more phone; returns whether it may join now."""
+        now = self._clock()
+        since, number = self._joined.pop(address, (now, 0))
+        if now - since >= 60.0:
+            since, number = now, 0
+        self._joined[address] = since, min(number + 1, PER_MINUTE + 1)
+        if len(self._joined) > ADDRESSES:
+            del self._joined[next(iter(self._joined))]
+        return number < PER_MINUTE
+
 
 PAUSE = 0.2
 """Shortest time, s, between two messages that are read from one page."""
@@ -82,13 +158,11 @@ class Sockets:
         self._hall.start(self._tell)
 
     def close(self) -> None:
-        """Stops sending."""
         self._hall.close()
 
     # ---------------------------------------------------------------- one page
 
     async def phone(self, line: Line) -> None:
-        """Serves a phone until its page is closed."""
         seat = ""
         try:
             while True:
@@ -126,7 +200,6 @@ class Sockets:
                 raise InputError(_NONSENSE)
 
     async def teacher(self, line: Line) -> None:
-        """Serves a page of the teacher until it is closed."""
         self._teachers.add(line)
         try:
             await line.send(json.dumps(self._greeting()))

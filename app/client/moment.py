@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.client.decimated import PlotWindow
-from app.client.ghost import GhostClient
+from app.client.recording import PlotWindow
 from app.client.simulation import Simulation
-from app.client.simulation_client import SimulationClient
+from app.client.simulation_client import GhostClient, SimulationClient
 from app.link.messages import Status
 
 TRACE_SECONDS = 6.0
@@ -48,6 +47,11 @@ class Moment:
     window: PlotWindow
     way: np.ndarray
     ghost: GhostState | None
+
+    @property
+    def beside(self) -> PlotWindow | None:
+        """The curves of the ghost; None if there is no ghost."""
+        return None if self.ghost is None else self.ghost.window
 
 
 def moment_of(learner: SimulationClient, past: float | None, curves: bool = True) -> Moment | None:

@@ -10,10 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeVar
 
-from app.client.decimated import History
-from app.client.pose_history import Frame, PoseHistory
-from app.client.rows import RowHistory
-from app.client.run_statistics import RunStatistics
+from app.client.recording import Frame, History, PoseHistory, RowHistory, RunFigures
 from app.link.fork_server import FIRST_PATIENCE
 from app.link.messages import Command, Loading, LoadRefused, Ready, Report, SimulationFailed, Status
 from app.link.process import Process, Spares
@@ -84,8 +81,6 @@ class Simulation(ABC):
         self.failure: str | None = None
         self.changed = 0
         self.tape = PoseHistory()
-        self.score: RunStatistics | None = None
-        self.record: RowHistory | None = None
         self._refusals: list[str] = []
         self._notices: list[str] = []
         self._spares = spares
@@ -106,6 +101,18 @@ class Simulation(ABC):
             self._heard(process, report)
 
         process.listen(hear)
+
+    @property
+    def record(self) -> RowHistory | None:
+        """The exact rows of the run; None before the first scene and after the end."""
+        history = self._history
+        return None if history is None else history.rows
+
+    @property
+    def figures(self) -> RunFigures | None:
+        """The figures of the run; None before the first row."""
+        history = self._history
+        return None if history is None else history.score.result()
 
     @property
     def pid(self) -> int | None:
@@ -167,20 +174,15 @@ class Simulation(ABC):
         """Handles the other effects of a report, on the thread of the process that sent it."""
 
     def _enter(self, ready: Ready) -> None:
-        record, history = self.record, self._history
+        history = self._history
+        block = Block.for_robot(ready.robot, ready.layout.size, ready.block)
+        again = None if history is None or not ready.again else history.under(block, ready.layout)
         self._free()
         self.ready, self.settings = ready, ready.settings
-        self._block = Block.for_robot(ready.robot, ready.layout.size, ready.block)
+        self._block, self._history = block, again or History(block, ready.layout)
         if not ready.again:
             self.status, self.code = None, ""
             self.tape.clear()
-        self.score = RunStatistics(ready.layout)
-        if ready.again and record is not None and history is not None:
-            self.record = record.under(ready.layout)
-            self._history = history.under(self._block, ready.layout, self.score.append_rows, self.record.take)
-        else:
-            self.record = RowHistory(ready.layout)
-            self._history = History(self._block, ready.layout, self.score.append_rows, self.record.take)
         self.changed += 1
 
     def _free(self) -> None:

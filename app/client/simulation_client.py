@@ -1,29 +1,33 @@
-"""The simulations of one learner: a process and perhaps its ghost. They continue when the page is
-reloaded."""
+"""The simulations of one learner: a process and perhaps its ghost. They continue when the page is reloaded.
+In a class, a step is shown before the robot has loaded it, and the robot is paused after its run."""
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from queue import Empty, Queue
 from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple, final
 
-from app.client.ghost import GhostClient
-from app.client.in_class import Coming, Rest
 from app.client.simulation import DEADLINE, Simulation, Trouble
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
 from app.link.messages import (
     Command,
+    FollowLeader,
     GetRun,
     Lead,
     Load,
     Loading,
     LoadRefused,
     Play,
+    Post,
+    Reached,
     Ready,
     Report,
     ResetAll,
@@ -35,9 +39,143 @@ from app.link.messages import (
 )
 from app.link.process import Process, Spares
 from app.link.threads import on_thread
+from robots import InputError
 
 if TYPE_CHECKING:
+    from app.link.messages import Status
+    from lessons.settings.settings import SceneSettings
     from lessons.teaching import lesson
+
+LEAD = 0.2
+"""Largest simulated time, s, by which the robot may be ahead of its ghost. If the ghost is too slow, both
+slow down, and the page says so. A ghost that lags would look like a ghost that tracks its target badly."""
+
+
+@final
+class GhostClient(Simulation):
+    """The process of a ghost that follows a leader. The first `Script` report contains the start of the
+    ghost. The ghost reports the time that it has reached; this time limits the leader's advance."""
+
+    who = "The ghost"
+
+    def __init__(
+        self,
+        words: str,
+        own: tuple[str, ...],
+        spares: Spares,
+        reached: Callable[[float], None],
+        lost: Callable[[GhostClient, str], None],
+    ) -> None:
+        """words: the ghost's name in the legend; own: assignments "PATH=VALUE" on top of the leader's
+        settings; reached: called with the time that the ghost has reached, s; lost: called with a sentence
+        when the ghost cannot start or has ended. Both functions are called on a thread of the process
+        handle."""
+        self.words, self.own = words, own
+        self._reached, self._lost = reached, lost
+        self._told_at: float | None = None
+        super().__init__(spares)
+
+    def hear(self, script: Script) -> None:
+        """Passes a report of the leader on to the ghost."""
+        if self._told_at is None:
+            self._told_at = time.monotonic()
+        self.send(FollowLeader(script, self.own))
+
+    @property
+    def quiet(self) -> float:
+        """As `Simulation.quiet`; 0 before the ghost has received its first command."""
+        return 0.0 if self._told_at is None else min(super().quiet, time.monotonic() - self._told_at)
+
+    def _heard(self, process: Process, report: Report) -> None:
+        match report:
+            case Reached(t):
+                self._reached(t + LEAD)
+            case LoadRefused(sentence) | SimulationFailed(sentence):
+                self._lost(self, sentence)
+            case _:
+                pass
+
+
+AFTER = 5.0
+"""Time, s, from the end of a run or the learner's last action until the robot is paused."""
+
+
+@final
+@dataclass(frozen=True)
+class Coming:
+    """A step that a page shows before the robot has loaded it.
+
+    Attributes:
+        lecture: the step before its run, with the prediction that the learner made meanwhile.
+        held: the learner's commands at this step; they are sent to the robot when it loads the step.
+        sent: whether the robot has received the command to load the step.
+    """
+
+    lecture: Lecture
+    held: tuple[Predict | RunStep, ...] = ()
+    sent: bool = False
+
+    @classmethod
+    def at(cls, place: LessonPlace, settings: SceneSettings | None) -> Coming | None:
+        """Returns the step before any command; None if its controls cannot be built from the present
+        settings. Raises InputError if there is no such step."""
+        from lessons.teaching.lesson import Step
+
+        part = place.part
+        if settings is None:
+            return None
+        try:
+            for control in part.controls if isinstance(part, Step) else part.knobs:
+                settings.value_at(control.path)
+        except InputError:
+            return None
+        return cls(Lecture(place, "waiting", attempt=0, t=0.0, duration=part.duration))
+
+    def after(self, command: Predict | RunStep) -> Coming:
+        """Returns the same step after the learner made a prediction or pressed Run."""
+        held = self.held if self.sent else (*self.held, command)
+        if isinstance(command, Predict):
+            return replace(self, lecture=replace(self.lecture, answer=command.answer), held=held)
+        return replace(self, held=held)
+
+    def sent_to(self, place: LessonPlace | None) -> Coming | None:
+        """Returns the same step after the robot received the command to load the step `place`; None if
+        `place` is another step."""
+        return replace(self, held=(), sent=True) if place == self.lecture.exercise else None
+
+    def is_at(self, lecture: Lecture) -> bool:
+        """Returns whether a report comes from a robot that has loaded this step."""
+        return self.sent and lecture.exercise == self.lecture.exercise
+
+
+@final
+class Rest:
+    """Whether a robot is paused. The robot continues when its learner moves or changes anything."""
+
+    def __init__(self) -> None:
+        self._since = time.monotonic()
+        self._rests = False
+
+    def stir(self) -> None:
+        """Called while a run makes progress."""
+        self._since = time.monotonic()
+
+    def wakes(self, command: Command) -> bool:
+        """Notes a command of the learner; returns whether the robot must continue before it gets this
+        command."""
+        if not isinstance(command, Post | Play):
+            return False
+        kept = isinstance(command, Play) and command.running  # the learner wants to see the robot move
+        self._since = math.inf if kept else max(self._since, time.monotonic())
+        woken, self._rests = self._rests and isinstance(command, Post), False
+        return woken
+
+    def begins(self, lecture: Lecture | None, status: Status | None) -> bool:
+        """Returns whether the robot must be paused now. lecture, status: the last reports."""
+        over = lecture is not None and lecture.phase == "done" and status is not None and status.running
+        self._rests = self._rests or (over and time.monotonic() - self._since > AFTER)
+        return self._rests and over
+
 
 STAYING = "Your teacher keeps the class at this step: wait for the next one."
 WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict
-from functools import partial
-from typing import TYPE_CHECKING
 
-from app.commands.output import print_table, write_json
-
-if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+from app.commands.output import print_table, progress_bar, write_json
 
 
 def bench(ticks: int = 300, json: str | None = None) -> int:
@@ -30,15 +24,9 @@ def bench(ticks: int = 300, json: str | None = None) -> int:
     if not 10 <= ticks <= 100_000:
         raise InputError(f"--ticks is {ticks}: give a number from 10 to 100000")
     found: dict[str, list[Timing]] = {}
-    if json is None and sys.stderr.isatty():
-        from rich.progress import Progress
-
-        with Progress(transient=True) as bar:
-            for scene in SCENES:
-                task = bar.add_task(f"bench {scene} …", total=1.0)
-                found[scene] = measure(scene, ticks=ticks, progress=partial(_show, bar, task))
-    else:
-        found = {scene: measure(scene, ticks=ticks) for scene in SCENES}
+    for scene in SCENES:
+        with progress_bar(f"bench {scene} …", json is None) as advance:
+            found[scene] = measure(scene, ticks=ticks, progress=advance)
     if json is not None:
         blocks = [
             {"scene": scene, "timings": [asdict(timing) for timing in timings], "ratios": ratios(timings)}
@@ -61,7 +49,3 @@ def bench(ticks: int = 300, json: str | None = None) -> int:
         dragged = ", dragged" if scene == SCENES[1] else ""
         print_table(f"Control step, {scene}{dragged}, three levels", columns, rows)
     return 0
-
-
-def _show(bar: Progress, task: TaskID, share: float) -> None:
-    bar.update(task, completed=share)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.commands.robots import HeldJoints, RobotFile, Tool
+from app.commands.lists import HeldJoints, RobotFile, Tool
 from robots import InputError
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from app.commands.output import figure, print_table, write_json
-from app.commands.progress import progress_bar
+from app.commands.output import figure, print_table, progress_bar, write_json
 
 if TYPE_CHECKING:
     from lessons.teaching.check import Verdict

@@ -1,11 +1,12 @@
-"""The output of a command: a table for people, JSON for programs."""
+"""The output of a command: a table for people, JSON for programs, a progress bar on a terminal."""
 
 from __future__ import annotations
 
 import errno
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -110,3 +111,19 @@ def machine_failure(error: BaseException) -> str | None:
             return "there is too little memory: end other programs, or raise the limit (ulimit -v)"
         each = each.__cause__ or each.__context__
     return None
+
+
+@contextmanager
+def progress_bar(title: str, shown: bool = True) -> Iterator[Callable[[float], None]]:
+    """Yields a function that sets the completed share. The bar is printed on stderr, if stderr is a
+    terminal."""
+    if not shown or not sys.stderr.isatty():
+        yield lambda share: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share: bar.update(task, completed=share)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from app.commands.output import print_table, write_json
-from app.commands.progress import progress_bar
+from app.commands.output import print_table, progress_bar, write_json
 from robots import InputError
 from robots.errors import unknown_name
 

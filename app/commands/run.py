@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from app.commands.output import check_file, figure, print_table, readable_unit, write_file, write_json
-from app.commands.progress import progress_bar
-from app.commands.robots import HeldJoints, RobotFile, Tool
+from app.commands.lists import HeldJoints, RobotFile, Tool
+from app.commands.output import (
+    check_file,
+    figure,
+    print_table,
+    progress_bar,
+    readable_unit,
+    write_file,
+    write_json,
+)
 from robots import InputError
 
 if TYPE_CHECKING:

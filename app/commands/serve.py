@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from app.commands.robots import HeldJoints, RobotFile, Tool
+from app.commands.lists import HeldJoints, RobotFile, Tool
 from robots import InputError
 
 
@@ -87,7 +87,7 @@ def serve(
     """
     from app.link.choice import SceneChoice
     from app.web.passes import given_token
-    from app.web.server import FIRST, PageServer
+    from app.web.server import FIRST, PageServer, ServerOptions
     from app.web.serving import serve as serve_page
     from lessons.own.files import Folder
     from lessons.replay.progress import read_key
@@ -128,19 +128,21 @@ def serve(
         file = class_file(host, port, choice, classroom)
     server = PageServer(
         choice,
-        host=host,
-        port=port,
-        max_sessions=max_sessions,
-        classroom=classroom,
-        trusted_origins=trusted_origin,
-        ask_token=not no_token,
-        own_files=None if no_own_files else Folder.at(own_files or "."),
-        key=None if key is None else read_key(key),
-        token=given_token(token_file, os.environ),
-        refers=one_of_several,
-        class_names=not no_names if class_ else None,
-        proxy_only=proxy_only,
-        embed_in=embed_in,
-        class_file=file,
+        ServerOptions(
+            host=host,
+            port=port,
+            max_sessions=max_sessions,
+            classroom=classroom,
+            trusted_origins=trusted_origin,
+            ask_token=not no_token,
+            own_files=None if no_own_files else Folder.at(own_files or "."),
+            key=None if key is None else read_key(key),
+            token=given_token(token_file, os.environ),
+            refers=one_of_several,
+            class_names=not no_names if class_ else None,
+            proxy_only=proxy_only,
+            embed_in=embed_in,
+            class_file=file,
+        ),
     )
     return serve_page(server, open_browser=not no_browser, drain=drain)

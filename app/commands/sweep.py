@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.commands.output import figure, readable_unit
-from app.commands.progress import progress_bar
+from app.commands.output import figure, progress_bar, readable_unit
 
 if TYPE_CHECKING:
     from lessons.experiments.sweep import Cell, Sweep

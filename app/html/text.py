@@ -39,7 +39,6 @@ def _digits(size: float) -> int:
 
 
 def swatch(colour: RGB) -> str:
-    """Returns a small square in a level's colour."""
     return (
         '<span style="display:inline-block;width:0.75em;height:0.75em;border-radius:2px;'
         f'background:{css(colour)};margin-right:0.4em"></span>'
@@ -64,8 +63,7 @@ def in_trouble(state: str, sentence: str) -> str:
     """Returns the text that a page shows for a simulation that ended unexpectedly, hangs or takes long."""
     colour = GOOD if state == "PREPARING" else BAD
     return block(
-        f"{badge(state, colour)} {esc(sentence)}",
-        f"border-left:3px solid {css(colour)};margin:0.4em 0",
+        f"{badge(state, colour)} {esc(sentence)}", f"border-left:3px solid {css(colour)};margin:0.4em 0"
     )
 
 

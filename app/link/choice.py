@@ -211,7 +211,6 @@ class SceneChoice:
         return replace(choice, run=kept), scene, own.settings, tuple(out.values())
 
     def _bare(self) -> Scene:
-        """Returns the scene before any settings are applied."""
         from lessons.runs.named import scene_named
         from lessons.scenes.catalog import load_scene
 

@@ -66,14 +66,12 @@ class LessonPlace:
 
     @property
     def part(self) -> Step | Challenge:
-        """The step or challenge at this place."""
         lesson = self.whole
         parts = parts_of(lesson)
         return parts[min(max(self.place, 0), len(parts) - 1)]
 
     @property
     def run(self) -> RunSpec:
-        """The run of this step or challenge."""
         return self.whole.run_of(self.part)
 
 

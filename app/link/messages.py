@@ -3,23 +3,106 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, Predict, RunStep
-from app.link.inside import Inside, InsideRequest
-from app.link.mission_view import MissionView
-from app.link.own_code import OwnCode
 
 if TYPE_CHECKING:
     from himpc.plan import Binding
     from himpc.telemetry import Layout
     from lessons.events import Event, MoveTarget
+    from lessons.geometry.matrix import Matrix
+    from lessons.geometry.plane import Plane
     from lessons.settings.settings import SceneSettings
     from robots import Robot
     from robots.world import World
+
+
+@dataclass(frozen=True)
+class MissionRow:
+    """A task of a mission. goal: position, m, or quaternion x y z w; None for a trajectory; hold: time to
+    stay at the goal, s, None: until released; there_s: time at the goal so far, s; done_at: time at which the
+    task was completed, s."""
+
+    name: str
+    role: str
+    goal: tuple[float, ...] | None
+    tolerance: float
+    hold: float | None
+    state: Literal["done", "active", "ahead"]
+    there_s: float | None
+    done_at: float | None
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person who receives balls. hand: point at which a ball is handed over, m; place: position on the
+    floor, m; balls: number of balls received."""
+
+    hand: tuple[float, float, float]
+    place: tuple[float, float]
+    balls: int
+
+
+@dataclass(frozen=True, eq=False)
+class MissionView:
+    """The state of a mission. paths: predicted path per role, (N + 1, 3) m."""
+
+    rows: tuple[MissionRow, ...]
+    done: bool
+    paths: dict[str, np.ndarray]
+    people: tuple[Person, ...]
+
+
+@dataclass(frozen=True)
+class OwnCode:
+    """The state of a controller from the user's own file.
+
+    Attributes:
+        file: path of the file.
+        fault: one sentence if the present content of the file cannot run.
+        saves: number of saved versions that took effect.
+        at: simulated time at which the last saved version took effect, s.
+    """
+
+    file: str
+    fault: str | None
+    saves: int
+    at: float
+
+
+@dataclass(frozen=True)
+class InsideRequest:
+    """The internal data of a tick that the page shows; the answer comes with every `Status`.
+
+    plane: the two joints whose increments span the plane of the cut, None: no plane; through: name of
+    the level whose solution the plane contains, "" for the applied solution; shift: offset of the
+    other joints' increments from that solution, N·m; matrix: name of the level whose QP is shown as a
+    picture, None: no picture; spectrum: whether to send the eigenvalues of I − M⁻¹M̄.
+    """
+
+    plane: tuple[int, int] | None = None
+    through: str = ""
+    shift: float = 0.0
+    matrix: str | None = None
+    spectrum: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """The requested internal data of the last tick; see `InsideRequest`.
+
+    why_not: a sentence if there is no tick to show; spectrum: the eigenvalues, (n,).
+    """
+
+    plane: Plane | None = None
+    matrix: Matrix | None = None
+    spectrum: np.ndarray | None = None
+    why_not: str = ""
+
 
 # ------------------------------------------------------------------ page → simulation
 
@@ -170,7 +253,7 @@ class Ready:
     user's own tasks that is not offered; world: the objects around the robot."""
 
     choice: SceneChoice
-    block: int  # the open file of the shared memory, see `app.link.connection`
+    block: int  # the open file of the shared memory, see `app.link.process`
     robot: Robot
     layout: Layout
     settings: SceneSettings

@@ -1,4 +1,5 @@
-"""The page's handle of a simulation process. Only `close` waits for the process."""
+"""The page's handle of a simulation process, and the messages over its connection. Only `close` waits for the
+process."""
 
 from __future__ import annotations
 
@@ -8,21 +9,56 @@ import multiprocessing as mp
 import os
 import pickle
 import signal
+import socket
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
 from app.link import fork_server
-from app.link.connection import hang_up, receive
 from app.link.fork_server import SERVER
-from app.link.messages import Command, Quit, Report, SimulationFailed
+from app.link.messages import Command, Quit, Ready, Report, SimulationFailed
 from app.link.threads import on_thread
 from robots.processes.orphans import end_with_parent
+
+
+def send(page: Connection, report: object) -> None:
+    """Sends a report; waits while the page does not read. Raises OSError if the page has ended."""
+    page.send(report)
+    if isinstance(report, Ready):
+        with _socket_of(page) as end:
+            socket.send_fds(end, [b"\0"], [report.block])
+
+
+def receive(child: Connection) -> Any:
+    """Waits for the next report and returns it. Raises EOFError or OSError if the other end is closed."""
+    report = child.recv()
+    if isinstance(report, Ready):
+        with _socket_of(child) as end:
+            _, files, _, _ = socket.recv_fds(end, 1, 1)
+        if not files:
+            raise OSError("an open file did not arrive: this process cannot open more")
+        return replace(report, block=files[0])
+    return report
+
+
+def hang_up(connection: Connection) -> None:
+    """Ends sending and receiving on both ends. Threads that wait there then continue."""
+    try:
+        with _socket_of(connection) as end:
+            end.shutdown(socket.SHUT_RDWR)
+    except OSError:
+        return
+
+
+def _socket_of(connection: Connection) -> socket.socket:
+    return socket.fromfd(connection.fileno(), socket.AF_UNIX, socket.SOCK_STREAM)
+
 
 _END = 1.0  # s within which a process must end by itself
 MOST = 256
@@ -216,13 +252,11 @@ class Spares:
         SERVER.enter(worker)
 
     def refill(self) -> None:
-        """Starts a spare if there is none."""
         with self._lock:
             if not self._closed and (self._spare is None or not self._spare.alive):
                 self._spare = Process(self._worker)
 
     def take(self) -> Process:
-        """Returns the spare, or a new child."""
         with self._lock:
             spare, self._spare = self._spare, None
         return spare if spare is not None and spare.alive else Process(self._worker)
@@ -239,7 +273,6 @@ class Spares:
 
 
 def _run(worker: str, page: Connection) -> None:
-    """The child's main function."""
     fork_server.hang_up()
     end_with_parent()
     import_module(worker).main(page)

@@ -59,7 +59,6 @@ class Block:
 
     @property
     def count(self) -> int:
-        """Number of rows written so far."""
         return int(self._head[0])
 
     def write(self, row: np.ndarray) -> None:
@@ -75,7 +74,6 @@ class Block:
         self._head[1] += 1
 
     def poses(self) -> np.ndarray:
-        """Returns a copy of the latest poses."""
         return self.moment()[1]
 
     def moment(self) -> tuple[float, np.ndarray]:
@@ -97,7 +95,6 @@ class Block:
         return first, self._ring[np.arange(first, end) % self.rows]
 
     def close(self) -> None:
-        """Detaches from the memory."""
         del self._head, self._time, self._ring, self._poses
         self._memory.close()
         self._close_file()

@@ -1,4 +1,5 @@
-"""One browser tab: builds the view and the panels for a learner's session and keeps them up to date."""
+"""One browser tab: builds the view and the panels for a learner's session and keeps them up to date. A lesson
+of the user's own is shown again when its file is saved."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
@@ -19,19 +21,54 @@ from app.adapter import private
 from app.client.progress import Notebook
 from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
+from app.html.palette import level_colours
 from app.html.text import block, esc, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.link.threads import on_thread
 from app.page.comfort import Comfort
-from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
 from lessons.course import COURSE, heading
-from lessons.own.files import Folder
+from lessons.own.files import Folder, Stamp, is_lesson, stamp
+from robots import InputError
 
 if TYPE_CHECKING:
-    from app.page.layout import Stage
-    from app.view.recorded import RecordedRun
+    from app.page.scene_view import SceneView
+    from app.view.robot import RecordedRun
+
+
+class LessonFile:
+    """Looks at the file whenever the page asks.
+
+    Attributes:
+        fault: what is wrong with the saved version, in one sentence; None if nothing is. The page continues
+            to show the version before.
+    """
+
+    def __init__(self) -> None:
+        self.fault: str | None = None
+        self._stamp: Stamp | None = None
+
+    def saved(self, choice: SceneChoice) -> SceneChoice | None:
+        """Returns the choice with the saved version of its lesson, if there is one that can be used."""
+        place = choice.exercise
+        if place is None or not is_lesson(place.lesson):
+            self.fault = None
+            return None
+        found = stamp(place.lesson)
+        if found is None:
+            return None
+        before, self._stamp = self._stamp, found
+        if before is None or before == found or before[0] != found[0]:
+            return None
+        try:
+            new = choice.at(replace(place, text=None).opened)
+        except InputError as error:
+            self.fault = choice.without_places(f"{error}. The page shows the version before.")
+            return None
+        self.fault = None
+        return None if new.exercise == place else new
+
 
 NARROW = 1000  # px: a narrower window, as in the cell of a notebook, has no room for panels at both sides
 _BROKEN = (
@@ -52,14 +89,12 @@ LEAST = 1 / 3
 
 
 def lay_out(gui: viser.GuiApi) -> None:
-    """Names and places the main panel."""
     gui.set_panel_label("himpc-lab")
     gui.main_panel.dock_right()
     gui.main_panel.set_width(400)
 
 
 def starting(choice: SceneChoice) -> str:
-    """Returns what a page shows until its robot is there."""
     return block("<b>Starting the robot …</b>") + first_lesson(choice)
 
 
@@ -80,7 +115,7 @@ def first_lesson(choice: SceneChoice) -> str:
 
 
 class Page:
-    """A thread that shows a learner's session. It builds a `Stage` whenever the learner has another scene."""
+    """A thread that shows a learner's session, and builds a `SceneView` for every scene."""
 
     def __init__(
         self,
@@ -109,7 +144,7 @@ class Page:
         self._notebook, self._comfort = notebook, comfort
         self._phone = self._narrow = False
         self._seen: tuple[object, ...] | None = None  # the scene for which the camera was turned
-        self._stage: Stage | None = None
+        self._scene: SceneView | None = None
         self._built: Ready | None = None
         self._trouble: Trouble | None = None
         self._cadence = Cadence()
@@ -134,12 +169,14 @@ class Page:
         self._closed.set()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(2.0)
-        if self._stage is not None:
-            self._stage.close()
+        if self._scene is not None:
+            self._scene.close()
 
     def _theme(self, dark: bool) -> None:
         self._dark = dark
         self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
+        if self._scene is not None:
+            self._scene.paint_floor(dark)
         self._on_dark(dark)
 
     # ---------------------------------------------------------------- loop
@@ -151,9 +188,9 @@ class Page:
                 self._look(began)
             except Exception as error:
                 self._break(error)
-            status, stage = self.learner.status, self._stage
+            status, scene = self.learner.status, self._scene
             pace = 1.0 if status is None or not status.capped else status.real_time_factor
-            period = self._cadence.shown(None if stage is None else stage.shown, pace, began)
+            period = self._cadence.shown(None if scene is None else scene.shown, pace, began)
             self._closed.wait(max(0.002, period - (time.perf_counter() - began)))
 
     def _look(self, now: float) -> None:
@@ -167,26 +204,26 @@ class Page:
             except Exception:
                 if learner.ready is ready:
                     raise
-                self._drop_stage()  # another scene was loaded meanwhile; it is built in the next cycle
+                self._drop_scene()  # another scene was loaded meanwhile; it is built in the next cycle
                 return
         self._pass_on()
         self._show_saved_lesson()
-        stage = self._stage
-        if stage is None:
+        scene = self._scene
+        if scene is None:
             self._show_early_trouble()
             self._play_recorded(now)
             return
         trouble = learner.trouble() or self._own_trouble()
         if trouble != self._trouble:
             self._trouble = trouble
-            stage.show_trouble(trouble)
+            scene.show_trouble(trouble)
         if private.waiting(self._client) > 0:
             learner.look()  # the connection is slow: data are stored, and the next picture shows newer data
             return
         try:
-            stage.follow(plots=self._cadence.plots_due(now), texts=self._cadence.texts_due(now))
+            scene.follow(plots=self._cadence.plots_due(now), texts=self._cadence.texts_due(now))
         except Exception:
-            # Another scene may be loaded at any moment; its rows and poses do not fit this stage.
+            # Another scene may be loaded at any moment; its rows and poses do not fit this scene.
             if learner.ready is self._built:
                 raise
 
@@ -194,13 +231,13 @@ class Page:
         """Returns whether the browser has received the scene that was built last. The next scene is built
         only after that. Otherwise, on a slow connection, the messages of all scenes that a learner opens
         would accumulate."""
-        return self._stage is None or private.waiting(self._client) == 0
+        return self._scene is None or private.waiting(self._client) == 0
 
     def _show(self, ready: Ready, same: bool) -> None:
         """Builds a scene. same: whether the scene continues the run that is shown, with another stack."""
-        if same and self._stage is not None:
+        if same and self._scene is not None:
             with self._client.atomic():
-                self._stage.recompose(ready)
+                self._scene.recompose(ready)
         else:
             self._build(ready)
 
@@ -255,7 +292,7 @@ class Page:
         if self._recorded is not None:
             self._recorded.follow(now)
         elif self._waiting is not None and self.learner.compiles and opens_first(self.learner.choice):
-            from app.view.recorded import RecordedRun
+            from app.view.robot import RecordedRun
 
             self._recorded = RecordedRun(self._client, self._phone, now)
 
@@ -269,43 +306,45 @@ class Page:
 
     def _build(self, ready: Ready) -> None:
         # Imported here, so that the page can open and show a waiting message before these modules are loaded.
-        from app.page.layout import Stage
+        from app.page.scene_view import SceneView
+        from app.tab.context import PageContext
         from app.view.robot import aim
+        from app.view.targets import in_order
 
-        self._drop_stage()
+        self._drop_scene()
         self._recorded = None
         with self._client.atomic():
             self._client.scene.reset()
             self._client.gui.reset()
             self._greet(self._client.gui)
-            self._stage = Stage(
+            context = PageContext(
                 self._client,
                 self.learner,
                 ready,
+                level_colours([task.level for task in in_order(ready)]),
+                self._event_loop,
                 self._dark,
                 self._load,
                 self._theme,
                 self._own_files,
-                self._event_loop,
                 self._notebook,
-                self._comfort,
-                self._narrow,
             )
+            self._scene = SceneView(context, self._comfort, self._narrow)
             add_command(self._client.gui, "Camera: show the whole robot", "F", self._frame)
             self._comfort.opened(self.learner)
             run = ready.choice.run
             seen = (run.scene, run.urdf, run.tip, run.hold, ready.choice.urdf_text, ready.robot.name)
             if seen != self._seen:  # after a restart the camera stays as the learner left it
                 ways = [task.path for task in ready.tasks if task.path is not None]
-                covered = self._stage.covered
+                covered = self._scene.covered
                 aim(self._client.camera, ready.robot, self._phone, ready.room, ways, covered)
                 self._seen = seen
         for sentence in ready.left_out:
             self._client.add_notification("Opened without one of your tasks", sentence, color="orange")
         self._trouble = None
 
-    def _drop_stage(self) -> None:
-        before, self._stage = self._stage, None
+    def _drop_scene(self) -> None:
+        before, self._scene = self._scene, None
         if before is not None:
             before.close()
 
@@ -318,7 +357,7 @@ class Page:
         if poses is None or ready is None or not np.isfinite(poses).all():
             return
         base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot may be far from the origin
-        covered = (0.0, 0.0) if self._stage is None else self._stage.covered
+        covered = (0.0, 0.0) if self._scene is None else self._scene.covered
         look(self._client.camera, np.vstack([base, poses[:, :3]]), self._phone, None, covered)
 
     def _break(self, error: Exception) -> None:
@@ -327,7 +366,7 @@ class Page:
         if self._closed.is_set():
             return  # the tab was closed, and its panels no longer exist
         traceback.print_exc()
-        before, self._stage = self._stage, None
+        before, self._scene = self._scene, None
         self._waiting = self._again = self._recorded = None
         with contextlib.suppress(Exception), self._client.atomic():
             self._client.scene.reset()
@@ -342,7 +381,7 @@ class Page:
         """Shows the session's notices, and its refusals, each in the panel that made the request."""
         refusals, notices = self.learner.take_messages()
         for sentence in map(self.learner.choice.without_places, refusals):
-            if self._stage is None or not self._stage.refuse(sentence):
+            if self._scene is None or not self._scene.refuse(sentence):
                 self._client.add_notification("Not loaded", sentence, color="red")
         for sentence in map(self.learner.choice.without_places, notices[-3:]):
             self._client.add_notification("Not changed", sentence, color="orange", auto_close_seconds=8.0)
@@ -399,7 +438,6 @@ class Cadence:
         return 1 / CALM if self._calm(now) else 1 / (self._share * POSES)
 
     def plots_due(self, now: float) -> bool:
-        """Returns whether the plots should be drawn now."""
         if self._calm(now):
             return True
         if now < self._next_plots:

@@ -1,45 +1,145 @@
-"""Dragging the target: the gizmo, the check of reachability, and the events that are posted."""
+"""Dragging the target: the gizmo, the check of reachability on a thread of its own, and the events that are
+posted."""
 
 from __future__ import annotations
 
 import math
 import threading
 import time
+import traceback
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
+import scipy.optimize  # noqa: F401  `ReachJudge` needs it: loaded before the server listens, not at the first drag
 import viser
 import viser.transforms as vtf
 
 from app.adapter import private
-from app.html.palette import BAD, TARGET
+from app.html.palette import BAD, RGB, TARGET
 from app.html.text import quantity
 from app.link.exercise import Lecture
-from app.link.messages import Ready, TaskView
-from app.view.coordinates import draggable, full, of_task, raw, xyzw
-from app.view.drag_target import Gap, Handle, Movable, turned
-from app.view.reachability import Question, Reachability, ReachabilityWorker
-from app.view.robot import ARROW, target_radius
+from app.link.messages import TaskView
+from app.link.threads import on_thread
+from app.tab.context import PageContext
+from app.view.robot import ARROW, gizmo_size, target_radius
+from app.view.targets import OPACITY, Gap, Handle, Movable, full, of_task, raw, wxyz, xyzw
 from lessons.events import MoveTarget
-from lessons.settings.torque import TorqueSettings
 from lessons.teaching.lesson import Challenge
 from lessons.teaching.prediction import Choice
+from robots import Robot
+from robots.reach import ReachJudge
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A dragged target: position (3,), m; rotation (3, 3) or None; frame: name of a link; number: number of
+    the drag event."""
+
+    position: np.ndarray
+    rotation: np.ndarray | None
+    frame: str
+    number: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Reachability:
+    """accepted: the target's position, or the nearest reachable position that was found; missing: distance
+    between the two positions, m; rotation_error: orientation error at the accepted position, rad (0 if no
+    orientation was requested); fault: why the target could not be checked, else ""."""
+
+    question: Question
+    accepted: np.ndarray
+    missing: float
+    rotation_error: float
+    fault: str = ""
+
+    @property
+    def reachable(self) -> bool:
+        return self.missing == 0.0 and not self.fault
+
+
+class ReachabilityWorker:
+    """A thread that solves the inverse kinematics of dragged targets."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        place: Callable[[Question, np.ndarray], None],
+        answer: Callable[[Reachability], None],
+    ) -> None:
+        """place: called with the accepted position, (3,) m, as soon as it is known; answer: called with the
+        complete verdict afterwards. Both are called on this worker's thread. If a check fails, only `answer`
+        is called, and the next question is checked as usual."""
+        self._robot = robot
+        self._place, self._answer = place, answer
+        self._wake = threading.Condition()
+        self._question: Question | None = None
+        self._closed = False
+        on_thread("reachability", self._work_on_thread)
+
+    def ask(self, question: Question) -> None:
+        with self._wake:
+            self._question = question
+            self._wake.notify()
+
+    def close(self) -> None:
+        with self._wake:
+            self._closed = True
+            self._wake.notify()
+
+    def _next(self) -> Question | None:
+        with self._wake:
+            self._wake.wait_for(lambda: self._closed or self._question is not None)
+            question, self._question = self._question, None
+            return None if self._closed else question
+
+    def _work_on_thread(self) -> None:
+        q = self._robot.home
+        while (question := self._next()) is not None:
+            try:
+                q = self._check(question, q)
+            except Exception as error:  # without an answer, no later drag would move the robot
+                traceback.print_exc()
+                q, fault = self._robot.home, f"{type(error).__name__}: {error}"
+                self._answer(Reachability(question, question.position, 0.0, 0.0, fault))
+
+    def _check(self, question: Question, q: np.ndarray) -> np.ndarray:
+        """Answers a question; returns the posture from which the next check begins, as a dragged target moves
+        little between two questions."""
+        model, judge = self._robot.model, ReachJudge(self._robot)
+        found = judge.solve(question.position, None, q, question.frame)
+        q = found.q
+        accepted, missing = question.position, 0.0
+        if not found.reachable:
+            data, frame = model.createData(), self._robot.frame_id(question.frame)
+            pin.forwardKinematics(model, data, q)
+            accepted = pin.updateFramePlacement(model, data, frame).translation.copy()
+            missing = found.position_error
+        self._place(question, accepted)
+        turned = 0.0
+        if question.rotation is not None:
+            pose = judge.solve(accepted, question.rotation, q, question.frame)
+            if not pose.reachable:
+                turned = max(pose.rotation_error, np.radians(1.0))
+            elif missing == 0.0:
+                q = pose.q
+        self._answer(Reachability(question, accepted, missing, turned))
+        return q
+
 
 Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
 _FRAME = 0.09  # m
 _STILL = 1e-4  # m, and the same number of rad: about a tenth of a pixel
 _INVITATION = "target: pull an arrow"
-_OPACITY = 0.5
 _NEAR = 2e-3
 """Distance, m, below which the hand is at its target."""
 _OWN = 1.0
 """Time, s, after a drag during which changes of targets are attributed to this drag."""
 _PATIENCE = 0.05
 """Time, s, that a drag waits for the reachability check, which takes a millisecond for reachable targets."""
-Later = Callable[[float, Callable[[], None]], object]
-"""Calls a function after a delay, s."""
 
 
 def paused_words(lecture: Lecture | None) -> str:
@@ -64,75 +164,67 @@ class TargetGizmo:
 
     def __init__(
         self,
-        scene: viser.SceneApi,
+        page: PageContext,
         position: TaskView,
         orientation: TaskView | None,
         start: np.ndarray,
         rotation: np.ndarray,
-        size: float,
-        radius: float,
         moved: Moved,
     ) -> None:
-        """start (3,): initial position of the target, m; rotation (3, 3); size: of the gizmo, m; radius: of
-        the ball, m; moved: called with the raw position and, if rings are shown, the raw rotation."""
+        """start (3,): initial position of the target, m; rotation (3, 3); moved: called with the raw position
+        and, if rings are shown, the raw rotation."""
+        scene, size, radius = page.client.scene, gizmo_size(page.robot), target_radius(page.robot)
         self.position, self.orientation = position, orientation
-        self._rings = orientation is not None
 
         def dragged() -> None:
             self._invites = False
             self._say()
-            moved(self.raw, self.rotation if self._rings else None)
+            moved(self.raw, self.rotation if self.turns else None)
 
-        place = {"wxyz": _wxyz(rotation), "visible": orientation is not None}
-        arrows = Handle(scene, "/target", position.axes, size, position=start)
-        rings = Handle(scene, "/target/turn", position.axes, size, rings=True, **place)
-        self._gizmo, self._turn = arrows.control, rings.control
-        self._ball = scene.add_icosphere(
-            "/target/ball", radius=radius, color=TARGET, opacity=_OPACITY, cast_shadow=False
-        )
-        self._ghost = scene.add_icosphere(
-            "/target/ghost", radius=radius, color=BAD, opacity=0.45, visible=False, cast_shadow=False
-        )
+        def ball(name: str, colour: RGB, opacity: float, visible: bool) -> viser.IcosphereHandle:
+            return scene.add_icosphere(name, radius=radius, color=colour, opacity=opacity, visible=visible)
+
+        place = {"wxyz": wxyz(rotation), "visible": orientation is not None}
+        arrows = self._arrows = Handle(scene, "/target", position.axes, size, position=start)
+        rings = self._rings = Handle(scene, "/target/turn", position.axes, size, rings=True, **place)
+        self._ball = ball("/target/ball", TARGET, OPACITY, True)
+        self._ghost = ball("/target/ghost", BAD, 0.45, False)
         self._label = scene.add_label("/target/label", _INVITATION, position=(0.0, 0.0, ARROW * size))
-        self._said = _INVITATION
-        self._invites, self._missing, self._paused = True, 0.0, ""
-        self._accepted = scene.add_icosphere(
-            "/accepted", radius=radius, color=TARGET, opacity=_OPACITY, visible=False, cast_shadow=False
-        )
-        self._then = scene.add_icosphere(
-            "/target_then", radius=radius, color=TARGET, opacity=_OPACITY, visible=False, cast_shadow=False
-        )
+        self._invites, self._missing, self._paused, self._far = True, 0.0, "", 0.0
+        self._accepted = ball("/accepted", TARGET, OPACITY, False)
+        self._then = ball("/target_then", TARGET, OPACITY, False)
         self._gap = Gap(scene, "/gap", BAD, 0.006)
         self._way = Gap(scene, "/way", TARGET, 0.004, _NEAR)
-        self._far = 0.0
         arrows.listen(dragged)
         rings.listen(dragged)
 
     @property
     def raw(self) -> np.ndarray:
-        return np.array(self._gizmo.position, float)
+        return self._arrows.position
 
     @property
     def rotation(self) -> np.ndarray:
-        return vtf.SO3(np.array(self._turn.wxyz, float)).as_matrix()
+        return self._rings.rotation
 
     @property
     def turns(self) -> bool:
         """Whether the rings are shown."""
-        return self._rings
+        return self._rings.control.visible
 
     def show_rings(self, on: bool) -> None:
         """Shows the rings if the user may rotate the target."""
-        on = on and self.orientation is not None
-        if on != self._rings:
-            self._rings = on
-            self._turn.visible = on
+        self._rings.control.visible = on and self.orientation is not None
+
+    def movable(self) -> Movable:
+        """Returns the target, which can be moved without a mouse."""
+        turn = self._rings.turn_by if self.turns else None
+        return Movable(self.position.name, lambda: self.raw, self._arrows.move_to, turn)
 
     def put(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
         """Moves the gizmo to a position and rotation, for example after a reset."""
-        self._gizmo.position = position
+        self._arrows.control.position = position
         if rotation is not None:
-            self._turn.wxyz = _wxyz(rotation)
+            self._rings.control.wxyz = wxyz(rotation)
         self.show_accepted(position, 0.0)
 
     def show_accepted(self, accepted: np.ndarray, missing: float) -> None:
@@ -149,9 +241,8 @@ class TargetGizmo:
 
     def pause(self, words: str) -> None:
         """words: a text that says how to continue a paused simulation; empty while the simulation runs."""
-        if words != self._paused:
-            self._paused = words
-            self._say()
+        self._paused = words
+        self._say()
 
     def reach_from(self, hand: np.ndarray) -> None:
         """Draws the line from the hand (3,), m, to its target, and writes its length."""
@@ -166,26 +257,21 @@ class TargetGizmo:
         else:
             far = f"{quantity(self._far, 'm')} to go" if self._far > _NEAR else ""
             words = self._paused or far or (_INVITATION if self._invites else "")
-        if words == self._said:
-            return
-        self._said = words
         self._label.visible = bool(words)
         if words:
             self._label.text = words
 
     def remove(self) -> None:
         """Removes the target from the scene."""
-        for node in (self._gizmo, self._accepted, self._then, self._gap, self._way):
+        for node in (self._arrows.control, self._accepted, self._then, self._gap, self._way):
             node.remove()
 
     def look_back(self, then: np.ndarray | None) -> None:
         """Shows the ball at its position in the past, without a gizmo; None: the present state."""
         back = then is not None
-        if self._then.visible != back:
-            self._then.visible, self._gizmo.visible = back, not back
-        if back:
-            self._way.show(self.raw, self.raw)
+        self._then.visible, self._arrows.control.visible = back, not back
         if then is not None:
+            self._way.show(self.raw, self.raw)
             self._then.position = then
 
 
@@ -217,10 +303,6 @@ class TargetFrames:
             self._desired.wxyz = xyzw[[3, 0, 1, 2]]
 
 
-def _wxyz(rotation: np.ndarray) -> np.ndarray:
-    return vtf.SO3.from_matrix(rotation).wxyz
-
-
 class Hand:
     """Gives the controller the position and orientation of the dragged target together.
 
@@ -228,143 +310,95 @@ class Hand:
     them at the same time. If the check takes longer than `_PATIENCE`, the orientation is sent with the last
     accepted position, and the newly checked position follows when it is known. If targets are not kept within
     reach, nothing waits.
-
-    If a scene has no draggable position target, there is no gizmo, and all methods do nothing.
     """
 
     def __init__(
         self,
-        scene: viser.SceneApi,
-        ready: Ready,
+        page: PageContext,
+        position: TaskView,
+        orientation: TaskView | None,
         targets: dict[str, np.ndarray],
-        tip: np.ndarray,
-        size: float,
-        post: Callable[..., None],
-        clamp: Callable[[], bool],
-        dragged: Callable[[], None],
-        later: Later,
+        clamp: viser.GuiCheckboxHandle,
     ) -> None:
-        """targets: the session's raw targets by task; tip (7,): pose of the robot's hand, position (m) and
-        quaternion wxyz; size: of the gizmo, m; post: posts events that take effect at the same control tick;
-        clamp: returns whether the controller gets only reachable targets; dragged: called at every move;
-        later: schedules a call on viser's loop, on which drags arrive."""
+        """position, orientation: see `draggable`; targets: the session's raw targets by task; clamp: whether
+        the controller gets only reachable targets."""
         self.verdict: Reachability | None = None
-        self._post, self._clamp, self._dragged = post, clamp, dragged
-        self._targets = targets
+        self._page, self._clamp, self._targets = page, clamp, targets
+        self._position, self._orientation = position, orientation
         self._moved_at = -math.inf
-        self._later = later
-        self._gizmo: TargetGizmo | None = None
-        self._judge: ReachabilityWorker | None = None
+        self._closed = False  # a drag or the result of a check can arrive while the gizmo is replaced
         self._lock = threading.Lock()  # drags arrive on viser's loop, the check answers on its own thread
         self._moves = self._given = self._turned = self._forgotten = 0
-        position, orientation = draggable(ready.tasks)
-        if position is None:
-            return
         start = of_task(position, targets)
         turned = None if orientation is None else of_task(orientation, targets)
         if orientation is not None and turned is None:
             turned = raw(orientation)
-        self._place = full(position, position.raw if start is None else start, tip[:3])
-        self._gizmo = TargetGizmo(
-            scene,
-            position,
-            orientation,
-            self._place,
-            np.eye(3) if turned is None else turned,
-            size,
-            target_radius(ready.robot),
-            self._moved,
-        )
-        self._judge = ReachabilityWorker(ready.robot, self._placed, self._judged)
+        hand = page.poses_or_still()[-1, :3]
+        self._place = full(position, position.raw if start is None else start, hand)
+        self._judge = ReachabilityWorker(page.robot, self._placed, self._judged)
+        rotation = np.eye(3) if turned is None else turned
+        self._gizmo = TargetGizmo(page, position, orientation, self._place, rotation, self._moved)
 
     def _moved(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
-        gizmo, judge = self._gizmo, self._judge
-        if gizmo is None or judge is None:
-            return  # a drag can arrive while the gizmo is replaced for another stack
-        self._dragged()
+        if self._closed:
+            return
+        self._page.dragged = True
         self._moved_at = time.monotonic()
-        waits = self._clamp()
+        waits = bool(self._clamp.value)
         with self._lock:
             self._moves += 1
-            question = Question(position, rotation, gizmo.position.frame, self._moves)
+            question = Question(position, rotation, self._position.frame, self._moves)
             if not waits:
-                self._give(gizmo, question, position)
-        judge.ask(question)
+                self._give(question, position)
+        self._judge.ask(question)
         if waits:
-            self._later(_PATIENCE, partial(self._wait_no_longer, question))
+            self._page.loop.call_later(_PATIENCE, self._wait_no_longer, question)
 
-    def _give(self, gizmo: TargetGizmo, question: Question, place: np.ndarray) -> None:
+    def _give(self, question: Question, place: np.ndarray) -> None:
         """Posts a position (3,), m, and the orientation at the same moment of the drag, together. The
         orientation is omitted if a later one was already posted."""
         self._given, self._place = max(self._given, question.number), place
-        axes = ["xyz".index(axis) for axis in gizmo.position.axes]
-        moves = [MoveTarget(gizmo.position.name, tuple(float(place[axis]) for axis in axes))]
-        if question.rotation is not None and gizmo.orientation is not None and question.number > self._turned:
+        axes = ["xyz".index(axis) for axis in self._position.axes]
+        moves = [MoveTarget(self._position.name, tuple(float(place[axis]) for axis in axes))]
+        if question.rotation is not None and self._orientation is not None and question.number > self._turned:
             self._turned = question.number
-            moves.append(MoveTarget(gizmo.orientation.name, xyzw(question.rotation)))
-        self._post(*moves)
+            moves.append(MoveTarget(self._orientation.name, xyzw(question.rotation)))
+        self._page.post(*moves)
 
     def _wait_no_longer(self, question: Question) -> None:
         with self._lock:
-            gizmo = self._gizmo
             # Without an orientation there is nothing to send in the meantime.
-            if gizmo is not None and question.number > self._turned and question.rotation is not None:
+            if not self._closed and question.number > self._turned and question.rotation is not None:
                 before = self._given
-                self._give(gizmo, question, self._place)
+                self._give(question, self._place)
                 self._given = before  # the result of the check will still be used
 
     def _placed(self, question: Question, accepted: np.ndarray) -> None:
         with self._lock:
-            gizmo = self._gizmo
-            if gizmo is not None and question.number > self._given:
-                self._give(gizmo, question, accepted)
+            if not self._closed and question.number > self._given:
+                self._give(question, accepted)
 
     def _judged(self, verdict: Reachability) -> None:
-        if self._gizmo is not None and verdict.question.number > self._forgotten:
+        if verdict.question.number > self._forgotten:
             self.verdict = verdict
 
     def movables(self) -> list[Movable]:
-        """Returns the target, which can be moved without a mouse; [] if there is no target."""
-        gizmo = self._gizmo
-        if gizmo is None:
-            return []
-        turn = self._turn_by if gizmo.turns else None
-        return [Movable(gizmo.position.name, lambda: gizmo.raw, partial(self._put, None), turn)]
-
-    def _put(self, rotation: np.ndarray | None, position: np.ndarray) -> None:
-        gizmo = self._gizmo
-        if gizmo is None:
-            return
-        active = ["xyz".index(axis) for axis in gizmo.position.axes]
-        place = gizmo.raw
-        place[active] = position[active]
-        gizmo.put(place, rotation)
-        self._moved(place, gizmo.rotation if gizmo.turns else None)
-
-    def _turn_by(self, by: np.ndarray) -> None:
-        gizmo = self._gizmo
-        if gizmo is not None:
-            self._put(turned(gizmo.rotation, by), gizmo.raw)
+        return [self._gizmo.movable()]
 
     def recall(self, tip: np.ndarray) -> None:
         """Moves the target to the robot's hand, whose pose is tip (7,)."""
-        gizmo = self._gizmo
-        if gizmo is not None:
-            rotation = vtf.SO3(tip[3:]).as_matrix()
-            gizmo.put(tip[:3], rotation)
-            self._moved(tip[:3], rotation if gizmo.orientation is not None else None)
+        rotation = vtf.SO3(tip[3:]).as_matrix()
+        self._gizmo.put(tip[:3], rotation)
+        self._moved(tip[:3], rotation if self._orientation is not None else None)
 
     def after_reset(self, targets: dict[str, np.ndarray]) -> None:
         """Resets the gizmo after the session has reset its raw targets."""
-        gizmo = self._gizmo
-        if gizmo is not None:
-            turned = None if gizmo.orientation is None else of_task(gizmo.orientation, targets)
-            place = of_task(gizmo.position, targets)
-            place = gizmo.raw if place is None else full(gizmo.position, place, gizmo.raw)
-            gizmo.put(place, turned)
-            with self._lock:
-                self._place = place
-                self._given = self._turned = self._forgotten = self._moves
+        turned = None if self._orientation is None else of_task(self._orientation, targets)
+        place = self._full(of_task(self._position, targets))
+        self._gizmo.put(place, turned)
+        with self._lock:
+            self._place = place
+            self._given = self._turned = self._forgotten = self._moves
         self.verdict = None
 
     def follow(self, targets: dict[str, np.ndarray]) -> None:
@@ -374,28 +408,18 @@ class Hand:
         if not by_hand and any(not np.array_equal(before.get(name, at), at) for name, at in targets.items()):
             self.after_reset(targets)
 
-    def show(
-        self,
-        frames: TargetFrames,
-        settings: TorqueSettings,
-        latest: np.ndarray,
-        fields: dict[str, slice],
-        paused: str,
-    ) -> None:
+    def show(self, frames: TargetFrames, latest: np.ndarray, paused: str) -> None:
         """Shows the filtered target of the last telemetry row, rings if an orientation can be dragged, and
         the verdict. paused: see `TargetGizmo.pause`."""
-        gizmo = self._gizmo
-        if gizmo is None:
-            return
-        turned = None if gizmo.orientation is None else latest[fields[f"x_d/{gizmo.orientation.name}"]]
-        position = latest[fields[f"x_d/{gizmo.position.name}"]]
-        frames.desired(full(gizmo.position, position, gizmo.raw), turned)
-        hand = full(gizmo.position, latest[fields[f"x/{gizmo.position.name}"]], gizmo.raw)
+        gizmo, orientation, fields = self._gizmo, self._orientation, self._page.ready.layout.fields
+        turned = None if orientation is None else latest[fields[f"x_d/{orientation.name}"]]
+        frames.desired(self._full(latest[fields[f"x_d/{self._position.name}"]]), turned)
+        hand = self._full(latest[fields[f"x/{self._position.name}"]])
         if np.isfinite(hand).all():
             gizmo.reach_from(hand)
-        if gizmo.orientation is not None:
-            name = gizmo.orientation.level
-            gizmo.show_rings(any(level.name == name and level.enabled for level in settings.levels))
+        if orientation is not None:
+            levels = self._page.settings.levels
+            gizmo.show_rings(any(each.name == orientation.level and each.enabled for each in levels))
         gizmo.pause(paused)
         if self.verdict is not None:
             gizmo.show_accepted(self.verdict.accepted, self.verdict.missing)
@@ -403,18 +427,18 @@ class Hand:
     def look_back(self, targets: dict[str, np.ndarray] | None) -> None:
         """Shows the dragged target as a ball at its place in the past, from the raw targets of that moment;
         None for the present."""
-        gizmo = self._gizmo
-        if gizmo is not None:
-            then = None if targets is None else of_task(gizmo.position, targets)
-            gizmo.look_back(None if then is None else full(gizmo.position, then, gizmo.raw))
+        then = None if targets is None else of_task(self._position, targets)
+        self._gizmo.look_back(None if then is None else self._full(then))
+
+    def _full(self, values: np.ndarray | None) -> np.ndarray:
+        """Returns the point with these values of the controlled coordinates, (3,) m."""
+        return full(self._position, values, self._gizmo.raw)
 
     def remove(self) -> None:
         """Removes the gizmo from the scene."""
         self.close()
-        gizmo, self._gizmo = self._gizmo, None  # a drag may still arrive
-        if gizmo is not None:
-            gizmo.remove()
+        self._gizmo.remove()
 
     def close(self) -> None:
-        if self._judge is not None:
-            self._judge.close()
+        self._closed = True
+        self._judge.close()

@@ -34,8 +34,7 @@ class EllipsoidView:
             found = ellipsoids(Configuration(self._robot, self._data, q, np.zeros_like(q)), stack)
         wanted = {each.task: each for each in found}
         for name, node in self._nodes.items():
-            if node.visible != (name in wanted):
-                node.visible = name in wanted
+            node.visible = name in wanted
         for name, each in wanted.items():
             self._place(name, each)
 
@@ -57,8 +56,6 @@ class EllipsoidView:
                 scale=size,
                 wxyz=turn,
                 position=each.position,
-                cast_shadow=False,
-                receive_shadow=False,
             )
         else:
             node.scale, node.wxyz, node.position = size, turn, each.position

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import viser
 
-from app.client.pending_edit import Send
 from app.html.palette import RGB
 from app.html.text import free_name, quantity
-from app.link.messages import Ready, Status, TaskView
-from app.link.mission_view import MissionRow
-from app.view.drag_target import Gap, Handle, Movable
-from app.view.targets import Targets
+from app.link.messages import MissionRow, Status, TaskView
+from app.tab.context import PageContext
+from app.view.robot import gizmo_size
+from app.view.targets import Gap, Handle, Movable, Targets, put
 from lessons.events import Event, InsertTask, MoveTarget
 
 _BALL = 0.07  # m
@@ -43,35 +42,22 @@ class Goal:
         each move; None if the goal cannot be dragged."""
         floor = "z" not in axes
         self._lift = np.array([0.0, 0.0, _LIFT if floor else 0.0])
-        self._axes, self._moved = axes, moved
         node = f"/goal/{role}"
         position = start + self._lift
-        self._handle: Handle | None = None
-        if moved is None:
-            self._node = scene.add_frame(node, show_axes=False, position=position)
-        else:
-            self._handle = Handle(scene, node, axes, size, position=position)
-            self._node = self._handle.control
+        self.handle = None if moved is None else Handle(scene, node, axes, size, position=position)
+        self._node: viser.SceneNodeHandle = (
+            scene.add_frame(node, show_axes=False, position=position)
+            if self.handle is None
+            else self.handle.control
+        )
         if floor:
-            scene.add_cylinder(
-                f"{node}/disc", radius=_DISC, height=0.015, color=colour, opacity=0.6, cast_shadow=False
-            )
+            scene.add_cylinder(f"{node}/disc", radius=_DISC, height=0.015, color=colour, opacity=0.6)
         else:
-            scene.add_icosphere(f"{node}/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
+            scene.add_icosphere(f"{node}/ball", radius=_BALL, color=colour, opacity=0.8)
         self._label = scene.add_label(f"{node}/label", role, position=(0.0, 0.0, 0.9 * size + 0.06))
         self._gap = Gap(scene, f"/gap/{role}", colour, 0.008, _GAP)
-        if moved is not None and self._handle is not None:
-            self._handle.listen(lambda: moved(self.place()))
-
-    def put(self, place: np.ndarray) -> None:
-        """Moves the goal as its arrows do, along the directions of the arrows only."""
-        if self._moved is not None and self._handle is not None:
-            active = ["xyz".index(axis) for axis in self._axes]
-            at = self.place()
-            at[active] = place[active]
-            self._handle.touch()
-            self._node.position = at + self._lift
-            self._moved(at)
+        if moved is not None and self.handle is not None:
+            self.handle.listen(lambda: moved(self.place()))
 
     def place(self) -> np.ndarray:
         """Returns the position of the goal, (3,) m."""
@@ -80,12 +66,9 @@ class Goal:
     def follow(self, goal: np.ndarray | None, text: str) -> None:
         """Updates the goal and its label. goal: the session's goal, (3,) m; None if the session has no goal;
         the goal then stays at the position to which it was dragged."""
-        if self._label.text != text:
-            self._label.text = text
-        if goal is None or (self._handle is not None and self._handle.held):
-            return
-        if not np.allclose(goal, self.place(), rtol=0.0, atol=1e-4):
-            self._node.position = goal + self._lift
+        self._label.text = text
+        if goal is not None and not (self.handle is not None and self.handle.held):
+            put(self._node, goal + self._lift)
 
     def reach_from(self, point: np.ndarray) -> None:
         """Draws the line from the controlled point (3,), m, to the goal."""
@@ -106,81 +89,63 @@ class Goals:
     """One goal for each position role, and rings at the robot's hand for each orientation role. A goal on a
     predefined trajectory cannot be dragged and shows the present reference of its point."""
 
-    def __init__(
-        self,
-        scene: viser.SceneApi,
-        ready: Ready,
-        colours: dict[str, RGB],
-        poses: np.ndarray,
-        size: float,
-        post: Send,
-        status: Callable[[], Status | None],
-        dragged: Callable[[], None],
-    ) -> None:
-        """poses: (J, 7), present poses of joints and tip; size: of the arrows of a hand, m; status:
-        returns the newest report; dragged: called at every move."""
-        self._post, self._status, self._dragged = post, status, dragged
-        self._roles = {task.name: task for task in ready.tasks if task.kind == "position"}
+    def __init__(self, page: PageContext) -> None:
+        self._page, tasks, size = page, page.ready.tasks, gizmo_size(page.robot)
+        self._roles = {task.name: task for task in tasks if task.kind == "position"}
         self._given = frozenset(name for name, task in self._roles.items() if task.raw is None)
         self._goals = {
             name: Goal(
-                scene,
+                page.client.scene,
                 name,
                 task.axes,
-                colours[task.level],
+                page.colours[task.level],
                 np.zeros(3) if task.raw is None else point(task.raw),
                 size if "z" in task.axes else 2 * size,
-                None if task.raw is None else lambda place, task=task: self._moved(task, place),
+                None if task.raw is None else partial(self._moved, task),
             )
             for name, task in self._roles.items()
         }
         self._asked: dict[str, str] = {}
-        turning = tuple(task for task in ready.tasks if task.kind == "orientation")
-        self._rings = Targets(scene, replace(ready, tasks=turning), colours, poses, 0.75 * size, self._turned)
+        turning = tuple(task for task in tasks if task.kind == "orientation")
+        self._rings = Targets(page, turning, self._turned)
 
     def _moved(self, task: TaskView, place: np.ndarray) -> None:
         """Moves the goal of the role's first open task; if there is no open task, adds a task that holds the
         point there."""
-        status = self._status()
-        if status is None or status.mission is None:
+        rows = self._page.mission_rows
+        if rows is None:
             return
-        self._dragged()
+        self._page.dragged = True
         goal = tuple(float(place["xyz".index(axis)]) for axis in task.axes)
-        row, names = open_row(status.mission.rows, task.name), [each.name for each in status.mission.rows]
+        row, names = open_row(rows, task.name), [each.name for each in rows]
         asked = self._asked.get(task.name)
         if row is not None:
-            self._post(MoveTarget(row.name, goal))
+            self._page.post(MoveTarget(row.name, goal))
         elif asked is not None and asked not in names:
-            self._post(MoveTarget(asked, goal))  # the session has not answered yet
+            self._page.post(MoveTarget(asked, goal))  # the session has not answered yet
         else:
             name = self._asked[task.name] = free_name(f"{task.name} by hand", names)
-            self._post(InsertTask(name, task.name, goal, hold=None))
+            self._page.post(InsertTask(name, task.name, goal, hold=None))
 
     def _turned(self, event: Event) -> None:
         """Changes the orientation of the role's open task."""
-        status = self._status()
-        if status is None or status.mission is None or not isinstance(event, MoveTarget):
-            return
-        row = open_row(status.mission.rows, event.task)
+        assert isinstance(event, MoveTarget)
+        row = open_row(self._page.mission_rows or (), event.task)
         if row is not None:
-            self._dragged()
-            self._post(MoveTarget(row.name, event.value))
+            self._page.dragged = True
+            self._page.post(MoveTarget(row.name, event.value))
 
     def turn(self, poses: np.ndarray, targets: dict[str, np.ndarray], live: bool) -> None:
         """Moves the rings along with the hand; arguments as for `app.view.targets.Targets.follow`."""
         self._rings.follow(poses, targets, live)
 
-    def follow(self, status: Status, latest: np.ndarray | None, fields: dict[str, slice]) -> None:
+    def follow(self, status: Status, latest: np.ndarray, fields: dict[str, slice]) -> None:
         """Updates goals and lines from a new status and the newest row of telemetry."""
         rows = () if status.mission is None else status.mission.rows
         for name, goal in self._goals.items():
             row, target = open_row(rows, name), status.targets.get(name)
             text = f"{name}: done" if row is None else row.name
-            at, wanted = (
-                (np.full(3, np.nan), np.full(3, np.nan))
-                if latest is None
-                else (latest[fields[f"x/{name}"]], latest[fields[f"x_d/{name}"]])
-            )
+            at, wanted = latest[fields[f"x/{name}"]], latest[fields[f"x_d/{name}"]]
             if target is None and name in self._given and np.isfinite(wanted).all():
                 target = wanted
             if target is not None and np.isfinite(at).all():
@@ -192,9 +157,13 @@ class Goals:
 
     def movables(self) -> list[Movable]:
         """Returns the goals, which can be moved without a mouse: positions first, then orientations."""
-        free = {name: task for name, task in self._roles.items() if task.raw is not None}
+        goals = self._goals.items()
         return [
-            *(Movable(name, goal.place, goal.put) for name, goal in self._goals.items() if name in free),
+            *(
+                Movable(name, goal.place, goal.handle.move_to)
+                for name, goal in goals
+                if goal.handle is not None
+            ),
             *self._rings.movables(),
         ]
 

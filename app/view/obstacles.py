@@ -12,7 +12,7 @@ import viser
 import viser.transforms as vtf
 
 from app.html.palette import RGB
-from app.view.drag_target import Handle
+from app.view.targets import Handle, put
 from robots.collision import Ball, Box, Floor, Obstacle
 
 _COLOUR: RGB = (180, 120, 110)
@@ -70,19 +70,13 @@ class _Solid:
                 dimensions=obstacle.size,
                 position=obstacle.centre,
                 wxyz=turn,
-                cast_shadow=False,
             )
             size = 0.5 * max(obstacle.size)
         else:
             self._body = scene.add_icosphere(
-                f"/obstacle/{index}",
-                radius=obstacle.radius,
-                color=_COLOUR,
-                position=obstacle.centre,
-                cast_shadow=False,
+                f"/obstacle/{index}", radius=obstacle.radius, color=_COLOUR, position=obstacle.centre
             )
             size = obstacle.radius
-        self._name, self._moved = obstacle.name, moved
         self._handle = Handle(
             scene,
             f"/obstacle_arrows/{index}",
@@ -92,26 +86,23 @@ class _Solid:
             disable_sliders=True,
             line_width=2.0,
         )
-        self._arrows = self._handle.control
-        self._handle.listen(self._dragged)
 
-    def _dragged(self) -> None:
-        x, y, z = (float(value) for value in self._arrows.position)
-        self._body.position = (x, y, z)
-        self._moved(self._name, (x, y, z))
+        def dragged() -> None:
+            x, y, z = self._handle.position.tolist()
+            self._body.position = (x, y, z)
+            moved(obstacle.name, (x, y, z))
+
+        self._handle.listen(dragged)
 
     def follow(self, obstacle: Ball | Box, arrows: bool) -> None:
-        if self._arrows.visible != arrows:
-            self._arrows.visible = arrows
-        if self._handle.held:
-            return
-        for handle in (self._body, self._arrows):
-            if not np.allclose(obstacle.centre, handle.position, rtol=0.0, atol=1e-4):
-                handle.position = obstacle.centre
+        self._handle.control.visible = arrows
+        if not self._handle.held:
+            put(self._body, obstacle.centre)
+            put(self._handle.control, obstacle.centre)
 
     def remove(self) -> None:
         self._body.remove()
-        self._arrows.remove()
+        self._handle.control.remove()
 
 
 class ReportedObstacles:
@@ -140,23 +131,14 @@ class ReportedObstacles:
         turn = vtf.SO3.from_z_radians(told.yaw if isinstance(told, Box) else 0.0).wxyz
         root = scene.add_frame(node, show_axes=False, position=told.centre, wxyz=turn)
         if isinstance(told, Box):
-            scene.add_box(
-                f"{node}/fill", color=_WRONG, dimensions=told.size, opacity=_FILL, cast_shadow=False
-            )
+            scene.add_box(f"{node}/fill", color=_WRONG, dimensions=told.size, opacity=_FILL)
             scene.add_line_segments(
                 f"{node}/outline", _edges(told), _WRONG, thickness=_LINE, thickness_units="screen"
             )
         else:
+            scene.add_icosphere(f"{node}/fill", radius=told.radius, color=_WRONG, opacity=_FILL)
             scene.add_icosphere(
-                f"{node}/fill", radius=told.radius, color=_WRONG, opacity=_FILL, cast_shadow=False
-            )
-            scene.add_icosphere(
-                f"{node}/outline",
-                radius=told.radius,
-                color=_WRONG,
-                subdivisions=2,
-                wireframe=True,
-                cast_shadow=False,
+                f"{node}/outline", radius=told.radius, color=_WRONG, subdivisions=2, wireframe=True
             )
         # The reported obstacle is named at its foot and the true obstacle at its top. The names do not hide
         # each other.

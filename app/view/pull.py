@@ -9,8 +9,8 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.client.pending_edit import Send
 from app.html.palette import BAD
+from app.tab.mirror import Send
 from app.view.robot import RobotView
 from lessons.events import Push
 from robots import PlantSettings, Robot
@@ -129,8 +129,5 @@ def push_at(
     centre = pose[:3] + vtf.SO3(pose[3:]).as_matrix() @ lever
     torque = np.cross(point - centre, force)
     return Push(
-        robot.model.names[joint],
-        tuple(float(x) for x in force),
-        tuple(float(x) for x in torque),
-        _HELD,
+        robot.model.names[joint], tuple(float(x) for x in force), tuple(float(x) for x in torque), _HELD
     )

@@ -1,17 +1,26 @@
-"""The robot's links, placed by poses from the simulation; on request with their capsules, and clickable."""
+"""The robot in the 3D view: its links, placed by poses from the simulation; on request with their capsules,
+with how far each joint has turned, and clickable; the ghost beside it; and the recorded run of the first
+lesson."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import viser
 
 from app.adapter import private
-from app.html.palette import RGB
+from app.client.moment import GhostState
+from app.client.recording import PlotWindow
+from app.html.palette import GHOST, RGB
+from app.link.poses import LinkPoses
 from app.view.camera import covered_shares, look, turn
-from robots import Robot
+from app.view.trails import NOTHING, trace
+from robots import Robot, load_robot
 from robots.covering.cover_of import cover_of
 from robots.shapes.capsules import cover_parts
 from robots.shapes.link_shapes import link_shapes
@@ -55,7 +64,6 @@ class RobotView:
                     shape.faces,
                     color=colour or shape.colour,
                     opacity=opacity,
-                    cast_shadow=opacity is None,
                 ),
             )
             for index, shape in enumerate(shapes)
@@ -181,9 +189,8 @@ class CoverView:
     """One translucent mesh per body. A mesh is a child of the body's frame and moves with the links of
     `RobotView`. Meshes are created when they are first shown."""
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot, root: str = "/robot") -> None:
-        """root: name of the robot's node."""
-        self._scene, self._robot, self._root = scene, robot, root
+    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+        self._scene, self._robot = scene, robot
         self._nodes: list[viser.MeshHandle] | None = None
         self._on = False
 
@@ -195,15 +202,104 @@ class CoverView:
         if self._nodes is None:
             self._nodes = [
                 self._scene.add_mesh_simple(
-                    f"{self._root}/{part.joint or 'base'}/cover",
+                    f"/robot/{part.joint or 'base'}/cover",
                     part.vertices,
                     part.faces,
                     color=part.colour,
                     opacity=_OPACITY,
-                    cast_shadow=False,
-                    receive_shadow=False,
                 )
                 for part in cover_parts(cover_of(self._robot))
             ]
         for node in self._nodes:
             node.visible = on
+
+
+_GHOSTLY = 0.38
+
+
+class GhostView:
+    """The 3D view of the ghost; it exists while there is a ghost."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, words: str) -> None:
+        self._root = scene.add_frame("/ghost", show_axes=False)
+        self._robot = RobotView(scene, robot, "/ghost", GHOST, _GHOSTLY)
+        self._trace = scene.add_line_segments("/ghost/trace", NOTHING, GHOST, thickness=0.004)
+        self._label = scene.add_label("/ghost/label", f"ghost: {words}")
+
+    def move(self, ghost: GhostState) -> None:
+        self._robot.move(ghost.poses[:-1])
+        at = ghost.poses[-1, :3] + np.array([0.0, 0.0, 0.08])
+        if not np.allclose(at, self._label.position, atol=1e-4):
+            self._label.position = at
+
+    def draw(self, ghost: GhostState) -> None:
+        """Draws the trace, about ten times per second."""
+        self._trace.points = trace(ghost.way[:, -1, :3]) if len(ghost.way) else NOTHING
+
+    def remove(self) -> None:
+        self._root.remove()
+
+
+_REST = 1.5
+"""Time, s, for which the robot stands still at the end of the run, before the run is shown again."""
+
+
+class RecordedRun:
+    """The robot of the first lesson, moved as in a run that was recorded by `python -m docs.record`. It is
+    removed with the rest of the scene when the page's own robot is there."""
+
+    def __init__(self, client: viser.ClientHandle, phone: bool, now: float) -> None:
+        """phone: see `aim`; now: the time, s, at which the run begins."""
+        told: dict[str, Any] = json.loads(files("app.view").joinpath("recorded.json").read_text("utf-8"))
+        robot = load_robot(told["robot"])
+        self._q, self._period, self._began = np.array(told["q"]), float(told["period"]), now
+        self._poses, self._view = LinkPoses(robot), RobotView(client.scene, robot, "/recorded")
+        self._label = client.scene.add_label("/recorded/label", "a recorded run")
+        aim(client.camera, robot, phone, np.empty((0, 3)))
+        self.follow(now)
+
+    def follow(self, now: float) -> None:
+        """Shows the run at a time, s; it is repeated."""
+        last = len(self._q) - 1
+        t = (now - self._began) % (last * self._period + _REST)
+        poses = self._poses.at(self._q[min(int(t / self._period), last)])
+        assert poses is not None
+        self._view.move(poses[:-1])
+        self._label.position = poses[-1, :3] + (0.0, 0.0, 0.08)
+
+
+_BEGIN = 0.05
+"""Simulated time, s, until which the robot counts as being at its start."""
+
+
+class JointTurns:
+    """A label at each joint, such as "3: 12°"; no labels if the recording does not contain the start."""
+
+    def __init__(self, scene: viser.SceneApi, joints: Sequence[int]) -> None:
+        """joints: indices of the joints that get a label, in the order of the poses, from 1 on."""
+        self._joints = joints
+        self._labels = [scene.add_label(f"/turn/{k}", "", visible=False) for k in joints]
+        self._start: np.ndarray | None = None
+
+    def draw(self, t: float, q: np.ndarray, poses: np.ndarray, window: PlotWindow) -> None:
+        """t: simulated time, s; q: (n,) rad; poses: (J, 7), of the joints and the tip; window: the
+        recording up to this time."""
+        if t < _BEGIN:
+            self._start = None
+        elif self._start is None:
+            self._start = _start_of(window)
+        start = self._start if np.isfinite(q).all() else None
+        for k, label in enumerate(self._labels):
+            label.visible = start is not None
+            if start is None:
+                continue
+            turn = abs(np.degrees(q[k] - start[k]))
+            text = f"{k + 1}: {turn:.{0 if turn >= 10 else 1}f}°"
+            label.text = text
+            label.position = tuple(poses[self._joints[k] - 1, :3])
+
+
+def _start_of(window: PlotWindow) -> np.ndarray | None:
+    fields = window.layout.fields
+    early = np.flatnonzero(window.columns(fields["t"])[:, 0] < _BEGIN)
+    return window.columns(fields["q"])[early[0]] if len(early) else None

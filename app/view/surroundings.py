@@ -1,12 +1,14 @@
-"""The surroundings of a mobile robot: people with balls, and the circle of its arm's reach."""
+"""What stands around a robot: people with balls, the reach of its arm, the objects that it can touch, and the
+contact forces."""
 
 from __future__ import annotations
 
 import numpy as np
 import viser
 
-from app.html.palette import BOUND, JOINTS, RGB
-from app.link.mission_view import Person
+from app.html.palette import BAD, BOUND, JOINTS, RGB
+from app.link.messages import ContactPoint, Person
+from robots.world import Ball, Box, Floor, Post, Thing, World
 
 _BALL: RGB = (245, 190, 30)
 _BALL_RADIUS = 0.06  # m
@@ -38,15 +40,9 @@ class People:
         scene, node, colour = self._scene, f"/person/{index}", JOINTS[(index + 3) % len(JOINTS)]
         place = np.array([*person.place, 0.0])
         figure = scene.add_frame(node, show_axes=False, position=place)
-        scene.add_cylinder(
-            f"{node}/body", _WIDE, _TALL, color=colour, position=(0, 0, 0.5 * _TALL), cast_shadow=False
-        )
+        scene.add_cylinder(f"{node}/body", _WIDE, _TALL, color=colour, position=(0, 0, 0.5 * _TALL))
         scene.add_icosphere(
-            f"{node}/head",
-            radius=_HEAD,
-            color=(225, 190, 165),
-            position=(0, 0, _TALL + 0.8 * _HEAD),
-            cast_shadow=False,
+            f"{node}/head", radius=_HEAD, color=(225, 190, 165), position=(0, 0, _TALL + 0.8 * _HEAD)
         )
         shoulder, hand = np.array([0.0, 0.0, 0.85 * _TALL]), np.array(person.hand) - place
         arm = np.array([[shoulder, hand - [0.0, 0.0, _BALL_RADIUS]]], np.float32)
@@ -56,11 +52,7 @@ class People:
             away = 0.35 * hand[:2] / max(float(np.linalg.norm(hand[:2])), 1e-6)
             beside = 0.13 * (k - 0.5 * (person.balls - 1)) * np.array([-away[1], away[0]]) / 0.35
             scene.add_icosphere(
-                f"{node}/got{k}",
-                radius=_BALL_RADIUS,
-                color=_BALL,
-                position=(*(away + beside), _BALL_RADIUS),
-                cast_shadow=False,
+                f"{node}/got{k}", radius=_BALL_RADIUS, color=_BALL, position=(*(away + beside), _BALL_RADIUS)
             )
         return figure
 
@@ -69,14 +61,11 @@ class Carried:
     """The ball in the robot's hand."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        self._ball = scene.add_icosphere(
-            "/carried", radius=_BALL_RADIUS, color=_BALL, visible=False, cast_shadow=False
-        )
+        self._ball = scene.add_icosphere("/carried", radius=_BALL_RADIUS, color=_BALL, visible=False)
 
     def follow(self, tip: np.ndarray, carried: bool) -> None:
         """tip (3,): the position of the hand, m."""
-        if self._ball.visible != carried:
-            self._ball.visible = carried
+        self._ball.visible = carried
         if carried and not np.allclose(tip, self._ball.position, rtol=0.0, atol=1e-4):
             self._ball.position = tip
 
@@ -96,5 +85,81 @@ class ReachCircle:
         )
 
     def show(self, on: bool) -> None:
-        if self._circle.visible != on:
-            self._circle.visible = on
+        self._circle.visible = on
+
+
+_STATIC: RGB = (160, 150, 140)
+_FREE: RGB = (70, 150, 190)
+_PER_NEWTON = 1e-3  # m: length of an arrow per newton
+_LONGEST, _SHORTEST = 0.35, 0.02  # m
+_HIDDEN = np.zeros((1, 2, 3), np.float32)
+
+
+class WorldView:
+    """The objects of a scene. A floor is drawn by the grid of the page."""
+
+    def __init__(self, scene: viser.SceneApi, world: World) -> None:
+        self._free: list[viser.SceneNodeHandle] = []
+        for index, thing in enumerate(world):
+            node = _drawn(scene, f"/world/{index}", thing)
+            if node is not None and thing.free:
+                self._free.append(node)
+
+    def follow(self, poses: np.ndarray) -> None:
+        """Moves the free objects: poses (k, 7), m and quaternion (w, x, y, z), in their order."""
+        for node, pose in zip(self._free, poses, strict=False):
+            if not np.allclose(pose, [*node.position, *node.wxyz], rtol=0.0, atol=1e-4):
+                node.position, node.wxyz = pose[:3], pose[3:]
+
+
+def _drawn(scene: viser.SceneApi, name: str, thing: Thing) -> viser.SceneNodeHandle | None:
+    pose, colour = np.array(thing.pose), _FREE if thing.free else _STATIC
+    position, wxyz = pose[:3], pose[3:]
+    match thing.shape:
+        case Ball(_, _, radius):
+            return scene.add_icosphere(name, radius, colour, position=position)
+        case Box(_, _, size):
+            return scene.add_box(name, colour, dimensions=size, position=position, wxyz=wxyz)
+        case Post(_, _, height, radius):
+            return scene.add_cylinder(name, radius, height, colour, position=position)
+        case Floor():
+            return None
+
+
+class ContactView:
+    """An arrow for each point of contact, in the direction of the force on the robot. Its length is 1 mm per
+    newton, at most 35 cm. The strongest force has a label."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._shown: tuple[ContactPoint, ...] = ()
+        self._arrows = scene.add_arrows(
+            "/contacts", _HIDDEN, BAD, shaft_radius=0.006, head_radius=0.016, head_length=0.035, visible=False
+        )
+        self._label = scene.add_label("/contact_label", "", visible=False)
+
+    def show(self, contacts: tuple[ContactPoint, ...]) -> None:
+        """Draws the arrows of the present contacts."""
+        if contacts == self._shown:
+            return
+        self._shown = contacts
+        self._arrows.visible = self._label.visible = bool(contacts)
+        if not contacts:
+            return
+        self._arrows.points = np.array([_arrow(each) for each in contacts], np.float32)
+        strongest = max(contacts, key=_strength)
+        pair = [each for each in contacts if each.between == strongest.between]
+        total = float(np.linalg.norm(np.sum([each.force for each in pair], axis=0)))
+        self._label.text = f"{strongest.between[1]} – {strongest.between[0]}: {total:.0f} N"
+        self._label.position = _arrow(strongest)[1]
+
+
+def _strength(contact: ContactPoint) -> float:
+    return float(np.linalg.norm(contact.force))
+
+
+def _arrow(contact: ContactPoint) -> np.ndarray:
+    """Start and end of a contact's arrow, (2, 3) m."""
+    force, at = np.array(contact.force), np.array(contact.position)
+    strength = _strength(contact)
+    length = float(np.clip(_PER_NEWTON * strength, _SHORTEST, _LONGEST))
+    return np.array([at, at + length * force / max(strength, 1e-9)])

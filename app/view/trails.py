@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from app.adapter import private
-from app.client.decimated import decimate
+from app.client.recording import decimate
 from app.html.palette import LEVELS, RGB
 
 EXAGGERATION = 100

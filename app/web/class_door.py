@@ -13,14 +13,12 @@ from urllib.parse import urlsplit
 from websockets.http11 import Request
 
 from app.classes.hall import Hall
-from app.classes.pages import PageName, page, policy
-from app.classes.sockets import Sockets
-from app.classes.table import table
+from app.classes.sockets import PageName, Sockets, page, policy
+from app.classes.views import table
 from app.classes.words import PHONES, TEACHER
-from app.web.answers import NO_CLASS
-from app.web.door import Answer, Door, is_upgrade
+from app.web.door import NO_CLASS, Answer, Door, is_upgrade
+from app.web.limits import WrongCodes
 from app.web.passes import QUERY
-from app.web.wrong_codes import WrongCodes
 
 _TEACHER = f"/{TEACHER}"
 _NOT_KEPT = ("Cache-Control", "no-store")
@@ -52,7 +50,7 @@ class ClassDoor:
 
     def answer(self, door: Door, request: Request, who: str, address: str | None) -> Answer | Served:
         """Returns the response to a request. The request must name this server and come from one of its
-        pages. who: identifies the sender, see `app.web.peers`; address: the address of the client, None if
+        pages. who: identifies the sender, see `app.web.passes`; address: the address of the client, None if
         it is unknown."""
         plain, host = urlsplit(request.path).path, request.headers["Host"]
         past = door.not_by_the_proxy(request)

@@ -3,36 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
+
+if TYPE_CHECKING:  # the server listens before this module is loaded
+    from app.web.sessions import Classroom, Sessions
 
 PATHS = "/health", "/metrics"
 """The addresses of the load."""
 _JSON, _PROMETHEUS = "application/json", "text/plain; version=0.0.4; charset=utf-8"
-
-
-class Place(Protocol):
-    """A session that a browser may use."""
-
-    @property
-    def attached(self) -> bool:
-        """Whether a page uses this session now."""
-        ...
-
-
-class Places(Protocol):
-    """The sessions of a server."""
-
-    max_sessions: int
-    turns_away: ClassVar[bool]
-
-    @property
-    def learners(self) -> Sequence[Place]:
-        """All sessions, also those whose browser may come back."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -68,7 +49,9 @@ class Load:
         return "stopping" if self.stopping else "full" if self.full else "open"
 
 
-def load_of(places: Places | None, connections: int, refused: int, messages: int, stopping: bool) -> Load:
+def load_of(
+    places: Sessions | Classroom | None, connections: int, refused: int, messages: int, stopping: bool
+) -> Load:
     """Returns the load of a server. places: None before the server is open."""
     learners = () if places is None else places.learners
     attached = sum(each.attached for each in learners)

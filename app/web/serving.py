@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING
 
 from app.classes.words import ONLY_HERE
 from app.link.threads import on_thread
-from app.web.address import seen_from_outside
-from app.web.classroom import Classroom
-from app.web.server import PageServer
+from app.web.server import PageServer, seen_from_outside
+from app.web.sessions import Classroom
 
 if TYPE_CHECKING:
     from app.web.server import PageServer

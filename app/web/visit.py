@@ -1,13 +1,18 @@
-"""One browser tab, from its first message until it is closed."""
+"""One browser tab, from its first message until it is closed. Its place (scene or step) is stored in the
+browser, so that another server at the same address can continue from there. Every tab has its own storage,
+which remains after a reload and after the end of the server. viser reads only the storage that all tabs
+share; a script copies the value there, under a key of this visit."""
 
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 import secrets
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,23 +20,75 @@ import viser
 
 from app.adapter import private
 from app.adapter.names import STORED
-from app.adapter.removed_handle_errors import print_exception, unless_removed
+from app.adapter.private import print_exception, unless_removed
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
+from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
 from app.link.process import why_not
 from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort, window_size
 from app.page.page import Page
-from app.panels.run.class_card import ClassCard
-from app.panels.run.classroom import add_watching
-from app.web import place
-from app.web.classroom import Classroom, Watcher
+from app.panels.run.classroom import ClassCard, add_watching
 from app.web.guard import GuardedConnection
 from app.web.inlet import Inlet
 from app.web.limits import UPLOADS, Uploads
-from app.web.sessions import Sessions, tokens_of
+from app.web.sessions import GRACE, Classroom, Sessions, Watcher, tokens_of
+from lessons.course import COURSE
 from lessons.own.files import Folder
 from lessons.replay.progress import LearnerProgress, load_progress
+from robots import InputError
+
+if TYPE_CHECKING:
+    from app.classes.hall import Hall
+    from app.web.class_file import ClassFile
+
+_KEY = "himpc-lab-place"
+
+
+def place_asked(key: str) -> str:
+    """Returns the script that makes the tab's value readable under `key`."""
+    kept = f"sessionStorage.getItem({json.dumps(_KEY)})"
+    return f'try {{ localStorage.setItem({json.dumps(STORED + key)}, {kept} ?? ""); }} catch {{}}'
+
+
+def place_kept(text: str) -> str:
+    """Returns the script that stores the value in the tab."""
+    return f"try {{ sessionStorage.setItem({json.dumps(_KEY)}, {json.dumps(text)}); }} catch {{}}"
+
+
+def place_written(choice: SceneChoice, code: str, start: SceneChoice) -> str:
+    """Returns the place of a page as text: the step of a lesson, or the code of the scene and its settings.
+    code: "" if there is none, e.g. for an uploaded robot, which other servers do not have; start: the choice
+    that new pages of this server show; only servers with the same start continue from the place."""
+    place: dict[str, str | int] = {"start": _digest(start)}
+    exercise = choice.exercise
+    if exercise is not None:
+        return json.dumps({**place, "lesson": exercise.lesson, "step": exercise.place + 1})
+    return json.dumps({**place, "code": code}) if code else ""
+
+
+def place_read(text: str | None, start: SceneChoice) -> SceneChoice | None:
+    """Returns the choice that a tab stored; None if it cannot be loaded. The text is not trusted."""
+    try:
+        found = json.loads(text or "{}")
+        if not isinstance(found, dict) or found.get("start") != _digest(start):
+            return None
+        lesson, step, code = found.get("lesson"), found.get("step"), found.get("code")
+        if lesson in COURSE and type(step) is int:
+            return SceneChoice.of_lesson(LessonPlace.at(str(lesson), step)).admitting(start)
+        if not isinstance(code, str):
+            return None
+        from lessons.replay.state import decode
+
+        return SceneChoice.of_state(decode(code)).admitting(start)
+    except (InputError, ValueError, RecursionError, TypeError):
+        return None
+
+
+def _digest(start: SceneChoice) -> str:
+    return hashlib.sha256(repr(start).encode()).hexdigest()[:16]
+
 
 THREADS = 4
 WAITING = 64
@@ -42,9 +99,9 @@ class Workers(ThreadPoolExecutor):
     """The threads of one page, on which its callbacks run without blocking other pages. Calls beyond their
     limit are dropped, and all calls after the shutdown."""
 
-    def __init__(self, threads: int = THREADS, waiting: int = WAITING) -> None:
-        super().__init__(threads, thread_name_prefix="page")
-        self._room = threading.Semaphore(threads + waiting)
+    def __init__(self) -> None:
+        super().__init__(THREADS, thread_name_prefix="page")
+        self._room = threading.Semaphore(THREADS + WAITING)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Submits a call; returns a future with the result None if the call is dropped."""
@@ -64,9 +121,6 @@ def _dropped() -> Future[Any]:
     future.set_result(None)
     return future
 
-
-if TYPE_CHECKING:  # needed for a class only, and loaded late
-    from app.classes.room import Room
 
 STORAGE = 5.0
 """Time, s, within which a browser must send its stored values."""
@@ -89,6 +143,48 @@ _GOES_ON = (
 _LONGEST = 100_000  # largest number of characters of a stored value
 
 
+@dataclass(frozen=True)
+class ServerOptions:
+    """How a server is started.
+
+    Attributes:
+        host, port: address at which the server listens.
+        max_sessions: number of pages with a robot of their own.
+        grace: time, s, for which a session continues after its tab was closed.
+        classroom: all pages show one session; pages on which the token was typed control the session.
+        trusted_origins: addresses of proxies that may serve the page.
+        ask_token: whether the page asks for a token.
+        own_files: folder whose files the owner's page may open and run by their paths; None: no page may
+            open files.
+        key: signs the learners' progress.
+        token: used in place of a random token.
+        refers: a full server answers 503, so that a proxy tries the next server, and a page that finds all
+            places taken connects again, perhaps to another server.
+        class_names: whether a class is asked for names; None: there is no class.
+        proxy_only: only a proxy that sends the token in its header is admitted.
+        embed_in: origins whose pages may show the page in a frame.
+        all_steer: every page of a classroom controls the robot.
+        class_file: the file with which the class continues after a new start.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+    max_sessions: int = 4
+    grace: float = GRACE
+    classroom: bool = False
+    trusted_origins: Sequence[str] = ()
+    ask_token: bool = True
+    own_files: Folder | None = None
+    key: bytes | None = None
+    token: str | None = None
+    refers: bool = False
+    class_names: bool | None = None
+    proxy_only: bool = False
+    embed_in: Sequence[str] = ()
+    all_steer: bool = False
+    class_file: ClassFile | None = None
+
+
 class Visit:
     """One visit of a browser. Each visit has a thread that admits and closes the visit. Callbacks run on a
     few other threads. Therefore no visit blocks viser's loop."""
@@ -98,18 +194,14 @@ class Visit:
         server: viser.ViserServer,
         client: viser.ClientHandle,
         sessions: Sessions | Classroom,
-        own_files: Folder | None,
-        key: bytes | None = None,
-        room: Room | None = None,
-        refers: bool = False,
+        options: ServerOptions,
+        room: Hall | None = None,
     ) -> None:
-        """own_files: folder of the files that the owner's page may name; key: signs the learners' progress;
-        room: the class, if there is one; refers: if all places are taken, the page connects again, perhaps
-        to another server."""
+        """room: the class, if there is one."""
         self._server = server
         self._client = client
         self._sessions = sessions
-        self._own_files, self._key, self._room, self._refers = own_files, key, room, refers
+        self._options, self._room, self._own_files = options, room, options.own_files
         self._page: Page | None = None
         self._left = False
         self._seat = ""
@@ -146,7 +238,7 @@ class Visit:
         private.run_script(self._client, ASK_MOTION)
         here = f"himpc-lab-place-{secrets.token_hex(8)}"
         size = f"{here}-window"
-        private.run_script(self._client, place.asking(here))
+        private.run_script(self._client, place_asked(here))
         private.run_script(self._client, ASK_WINDOW % (STORED, size))
         keys = (self._tokens_key, _DARK, self._progress_key, MOTION, here, size)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
@@ -164,9 +256,9 @@ class Visit:
         reduced = motion == REDUCED and isinstance(self._sessions, Sessions)
         self._comfort = Comfort(self._client, reduced, window_size(window))
         self._notebook = Notebook(
-            load_progress(progress, self._key, self._account),
+            load_progress(progress, self._options.key, self._account),
             lambda text: self._keep(self._progress_key, text),
-            self._key,
+            self._options.key,
             self._account,
         )
         self._then(tokens_of(tokens), kept)
@@ -201,7 +293,7 @@ class Visit:
         if watching is not None:  # the page has only watched so far
             watching.close()
         room = self._room
-        guide = room.guide if room is not None and self._teaches else None
+        guide = room.robot if room is not None and self._teaches else None
         leads = guide is not None
         entered = None
         if guide is None or isinstance(self._sessions, Classroom):
@@ -220,7 +312,7 @@ class Visit:
             room.recognise(learner.token, tokens, self._account)
             learner.shows_ghosts = isinstance(self._sessions, Classroom)
         if isinstance(self._sessions, Sessions) and not leads and learner.token not in tokens:
-            before = place.read(kept, self._sessions.start)
+            before = place_read(kept, self._sessions.start)
             if before is not None:
                 learner.load(before)
                 self._client.add_notification(*_GOES_ON, color="green", auto_close_seconds=8.0)
@@ -252,15 +344,15 @@ class Visit:
 
     def _watch(self) -> None:
         """Checks every _PERIOD s, on viser's event loop, whether scene or settings have changed. If so, the
-        tab stores the page's new place (see `app.web.place`), as the simulation reported it."""
+        tab stores the page's new place, as the simulation reported it."""
         if self._left or not isinstance(self._sessions, Sessions):
             return
         page = self._page
         if page is not None and page.learner.status is not None:
-            new = place.written(page.learner.choice, page.learner.code, self._sessions.start)
+            new = place_written(page.learner.choice, page.learner.code, self._sessions.start)
             if new != self._stored:
                 self._stored = new
-                private.run_script(self._client, place.keeping(new))
+                private.run_script(self._client, place_kept(new))
         self._server.get_event_loop().call_later(_PERIOD, self._watch)
 
     # ---------------------------------------------------------------- calls from the page
@@ -322,7 +414,7 @@ class Visit:
                 )
             )
             again = gui.add_button("Try again")
-        if self._refers:
+        if self._options.refers:
             loop = self._server.get_event_loop()
             loop.call_soon_threadsafe(loop.call_later, _ELSEWHERE, self._send_on)
 

@@ -9,8 +9,8 @@ from typing import final
 
 import numpy as np
 
-from app.link.connection import send
 from app.link.messages import Begin, Command, FollowLeader, Loading, LoadRefused, Quit, Reached
+from app.link.process import send
 from app.worker.simulation import SimulationRunner
 from lessons.scenes.catalog import as_torque_scene
 from lessons.session.ghost import GhostDriver, ghost_scene

@@ -85,7 +85,6 @@ class LessonRows:
         self._count += 1
 
     def until(self, t: float) -> LessonRows:
-        """Returns the rows up to a time, s."""
         count = int(np.searchsorted(self["t"][:, 0], t + 1e-9, "right"))
         return LessonRows(self._layout, count, self._rows[:count])
 
@@ -142,7 +141,6 @@ class Lecturer:
 
     @property
     def waiting(self) -> bool:
-        """Whether the run has not begun."""
         return self._phase in ("waiting", "preparing")
 
     @property

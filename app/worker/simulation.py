@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
 
 from app.link.choice import SceneChoice
-from app.link.inside import InsideRequest
 from app.link.messages import (
     Begin,
     Command,
     GetRun,
+    InsideRequest,
     Lead,
     Load,
     LoadRefused,
@@ -31,17 +32,94 @@ from app.link.messages import (
     StepTicks,
     WaitAt,
 )
+from app.link.poses import LinkPoses
 from app.link.ring import Block
 from app.worker.lecturer import Lecturer
-from app.worker.outlet import Outlet
-from app.worker.reports.start import SessionReport, start
-from app.worker.state_code import StateCode
+from app.worker.report import SessionReport
+from app.worker.torque import TorqueRun
+from app.worker.velocity import VelocityRun
 from lessons.events import Reset, Set
+from lessons.replay.state import encode, state_of
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
+from lessons.session.start import begin
+from lessons.session.torque import TorqueSession
+from lessons.session.velocity import VelocitySession
 from lessons.settings.assignments import parse_assignment
 from lessons.settings.settings import SceneSettings
 from robots import InputError
+
+__all__ = ["SessionReport", "TorqueRun", "VelocityRun", "start"]
+
+_REPORTS: Mapping[type[Session], type[SessionReport]] = {
+    TorqueSession: TorqueRun,
+    VelocitySession: VelocityRun,
+}
+
+
+def start(scene: Scene, seed: int) -> SessionReport:
+    """Starts a scene from its beginning. Raises InputError if its settings do not fit its robot."""
+    session = begin(scene, seed)
+    return _REPORTS[type(session)](session)
+
+
+class StateCode:
+    """Makes the codes of one scene. before: the settings of the scene before any assignment; None if they are
+    not known."""
+
+    def __init__(self, choice: SceneChoice, before: SceneSettings | None) -> None:
+        self._choice, self.before = choice, before
+        self._made: SceneSettings | None = None  # the settings of the last code
+
+    def of(self, settings: SceneSettings) -> str:
+        """Returns the code of the scene with these settings; "" if there is none, e.g. for an uploaded robot.
+        Loads nothing."""
+        self._made, choice = settings, self._choice
+        if self.before is None or choice.urdf_text is not None:
+            return ""
+        exercise = choice.exercise
+        lesson, step = (None, None) if exercise is None else (exercise.lesson, exercise.place + 1)
+        try:
+            return encode(state_of(choice.run, settings, lesson=lesson, step=step, before=self.before))
+        except InputError:
+            return ""
+
+    def news(self, settings: SceneSettings) -> str | None:
+        """As `of`; None if these are the settings of the last code."""
+        return None if settings is self._made else self.of(settings)
+
+
+class Outlet:
+    """The memory of one robot under one stack.
+
+    Attributes:
+        block: the shared memory.
+        poses: computes the poses that are written into the memory.
+        layout: the layout of the rows.
+        step_us, late: the indices of these columns; None if a row has no such column.
+        told: whether the page has received the handle of this memory.
+    """
+
+    def __init__(self, session: Session, told: bool = True) -> None:
+        """Raises InputError if there is not enough memory."""
+        self.told = told
+        self.poses, self.layout = LinkPoses(session.robot), session.layout
+        self.block = Block.for_robot(session.robot, session.layout.size)
+        fields = session.layout.fields
+        self.step_us = fields["step_us"].start
+        self.late = fields["late"].start if "late" in fields else None
+
+    def fits(self, session: Session) -> bool:
+        """Returns whether the session's rows still have this layout. Each stack has its own layout."""
+        if session.layout is not self.layout and session.layout == self.layout:
+            self.layout = session.layout
+        return session.layout is self.layout
+
+    def write_poses(self, session: Session) -> None:
+        """Writes the true poses of the plant's links, for the 3D view."""
+        poses = self.poses.at(np.asarray(session.plant.q))
+        if poses is not None:
+            self.block.write_poses(poses, session.t)
 
 
 class Leader:
@@ -365,16 +443,9 @@ class SimulationRunner:
             binding=run.binding() if ran else (),
             notices=notices,
             settings=None if settings is sent else settings,
-            gauge=None if self.running else run.gauge(),
-            mission=run.mission(),
             lecture=None if self.lecturer is None else self.lecturer.report(),
-            inside=run.inside() if ran else None,
-            own=run.own(),
-            ranks=run.ranks(),
-            contacts=run.contacts(),
-            objects=run.objects(),
-            nearest=run.nearest(),
             code=self._code.news(settings) if coded else None,
+            **run.extras(self.running, ran),
         )
 
     def close(self) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from app.html.curves import decades, path_through, tick_label, ticks
+from app.html.svg import decades, path_through, tick_label, ticks
 
 WIDTH, HEIGHT = 640, 180
 LEFT, RIGHT, TOP, BOTTOM = 58, 8, 8, 22

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from app.link.choice import SceneChoice
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from lessons.scenes.run_spec import RunSpec
 
 
@@ -18,7 +18,7 @@ def served(choice: SceneChoice | str = "planar3-hold", **options: Any) -> Iterat
     choice: also the name of a scene. options: those of `PageServer`; by default one learner has room.
     """
     opened = choice if isinstance(choice, SceneChoice) else SceneChoice(RunSpec(choice))
-    server = PageServer(opened, **{"port": 0, "max_sessions": 1, **options})
+    server = PageServer(opened, ServerOptions(**{"port": 0, "max_sessions": 1, **options}))
     try:
         yield server
     finally:

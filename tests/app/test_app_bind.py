@@ -15,14 +15,11 @@ import pytest
 import viser
 from viser import _messages
 
-from app.client.pending_edit import PendingEdit
-from app.panels.torque.controller import ControllerPanel, HorizonPanel
-from app.panels.torque.plant import add_plant
-from app.panels.velocity.controller import HtmpcPanel
-from app.panels.velocity.plant import add_servo_plant
-from app.panels.widgets import mirror as bind
-from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.window import PopupWindow
+from app.panels.torque.controller import ControllerPanel, HorizonPanel, add_plant
+from app.panels.velocity.controller import HtmpcPanel, add_servo_plant
+from app.panels.widgets.command import PopupWindow
+from app.tab import mirror as bind
+from app.tab.mirror import Bindings, PendingEdit
 from app.web.inlet import allowed
 from lessons.events import Event, Set
 from lessons.scenes.catalog import load_scene, torque_scene

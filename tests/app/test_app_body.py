@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.client.decimated import BUCKETS, History
+from app.client.recording import BUCKETS, History
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.messages import Load, LoadRefused, Play, Post, Ready, ResetAll, Speed, StepTicks
 from app.panels.run.playback import headline
-from app.worker.pacing import BACKLOG, Pacer
+from app.worker.main import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
 from lessons.scenes.run_spec import RunSpec

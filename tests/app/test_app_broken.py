@@ -14,10 +14,10 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.messages import Load
-from app.page.layout import Stage
 from app.page.page import Page
+from app.page.scene_view import SceneView
 from app.panels.run.help import HelpPanel
-from app.panels.widgets.in_view import AWAKE, LABEL
+from app.tab.in_view import AWAKE, LABEL
 from browsing.wire import Wire, eventually
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
@@ -32,10 +32,10 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
     """On a slow computer the next lesson is loaded while the page still writes the texts of this one. The
     page is built once for the next lesson: if it were shown at once and then built again, presses in between
     would be lost."""
-    leaving, writing, write = threading.Event(), threading.Event(), Stage._write
+    leaving, writing, write = threading.Event(), threading.Event(), SceneView._write
     pages: list[Wire] = []
 
-    def slow(stage: Stage, moment: Moment) -> None:
+    def slow(stage: SceneView, moment: Moment) -> None:
         learner = stage._learner
         late = leaving.is_set() and stage.page.ready.choice.exercise == LessonPlace("one-task")
         if late:
@@ -46,7 +46,7 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
             # the browser already shows the next lesson
             eventually(lambda: any(answers(page) for page in pages), 3.0)
 
-    monkeypatch.setattr(Stage, "_write", slow)
+    monkeypatch.setattr(SceneView, "_write", slow)
     with served(SceneChoice.of_lesson(LessonPlace("one-task"))) as server, Wire(server.link) as page:
         pages.append(page)
         assert eventually(lambda: page.shows(load_lesson("one-task").steps[0].title))
@@ -87,7 +87,7 @@ def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.Monk
         assert len(page.notices) == said + 1
 
 
-@pytest.mark.parametrize("place", [(HelpPanel, "_fill"), (Stage, "_write"), (Page, "_pass_on")])
+@pytest.mark.parametrize("place", [(HelpPanel, "_fill"), (SceneView, "_write"), (Page, "_pass_on")])
 def test_a_page_that_fails_says_so_and_can_be_started_again(
     place: tuple[type, str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from app.__main__ import main
-from app.classes.newcomers import PER_MINUTE, Newcomers
+from app.classes.sockets import PER_MINUTE, Newcomers
 from app.classes.words import LONGEST, ONLY_HERE
 from app.client.simulation_client import STAYING, SimulationClient
 from app.link.exercise import LessonPlace
@@ -327,7 +327,7 @@ def test_a_flood_of_new_phones_from_one_address_waits(
     assert server.hall is not None
     with phone(server) as one:
         seat = one.told["seat"]
-    monkeypatch.setattr("app.classes.newcomers.PER_MINUTE", 0)
+    monkeypatch.setattr("app.classes.sockets.PER_MINUTE", 0)
     with Line(f"{server.url}/v/{server.hall.code}") as new, Line(f"{server.url}/v/{server.hall.code}") as old:
         new.send(do="hello")
         told = new.hear("say")
@@ -365,7 +365,7 @@ def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -
 
 def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: dict[str, Any] = {}
-    monkeypatch.setattr("app.web.server.PageServer", lambda _, **options: asked.update(options))
+    monkeypatch.setattr("app.web.server.PageServer", lambda _, options: asked.update(vars(options)))
     monkeypatch.setattr("app.web.serving.serve", lambda _, **options: 0)
     for given, names in (([], None), (["--class"], True), (["--class", "--no-names"], False)):
         assert main(["--no-browser", *given]) == 0

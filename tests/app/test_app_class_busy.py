@@ -14,11 +14,9 @@ import pytest
 from served import served
 from test_app_class import LONG
 
-from app.classes.hall import Hall
-from app.classes.queue import PATIENCE, BuildQueue
-from app.client import in_class
-from app.client.in_class import Rest
-from app.client.simulation_client import BEHIND, SimulationClient
+from app.classes.hall import PATIENCE, BuildQueue, Hall
+from app.client import simulation_client
+from app.client.simulation_client import BEHIND, Rest, SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace
 from app.link.messages import Play, Post, Ready
@@ -103,24 +101,24 @@ def test_a_robot_rests_after_its_run_until_its_learner_does_something(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = [0.0]
-    monkeypatch.setattr(in_class.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(simulation_client.time, "monotonic", lambda: now[0])
     lecture = Lecture(LessonPlace("a-redundant-arm"), "done", 1, 2.0, 2.0)
     body = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
     status = body.status()
     body.close()
     resting, move = Rest(), Post(Reset())
     assert status.running and not resting.begins(lecture, status), "its learner has just seen the result"
-    now[0] += in_class.AFTER + 1.0
+    now[0] += simulation_client.AFTER + 1.0
     assert not resting.begins(replace(lecture, phase="running"), status)
     assert resting.begins(lecture, status)
     assert resting.wakes(move) and not resting.wakes(move) and not resting.begins(lecture, status)
-    now[0] += in_class.AFTER + 1.0
+    now[0] += simulation_client.AFTER + 1.0
     assert resting.begins(lecture, status)
     assert not resting.wakes(Play(True)), "the learner has done it"
-    now[0] += in_class.AFTER + 1.0
+    now[0] += simulation_client.AFTER + 1.0
     assert not resting.begins(lecture, status), "and wants it to move"
     resting.stir()
-    now[0] += in_class.AFTER + 1.0
+    now[0] += simulation_client.AFTER + 1.0
     assert resting.begins(lecture, status), "until the next run is over"
 
 

@@ -9,9 +9,9 @@ import pytest
 from test_app_class import LONG, Line, server
 from test_app_load import get
 
-from app.web import guard, wrong_codes
+from app.web import guard, limits
+from app.web.limits import ADDRESSES, FORGET, FREE, MOST_LATE, WrongCodes
 from app.web.server import PageServer
-from app.web.wrong_codes import ADDRESSES, FORGET, FREE, WAITING, WrongCodes
 
 __all__ = ["server"]
 pytestmark = pytest.mark.usefixtures("one_fork_server")
@@ -48,7 +48,7 @@ def test_guesses_are_said_and_slowed_down_and_do_not_disturb_a_phone(
         with Line(right) as other:
             other.send(do="hello")
             assert other.hear("seat")["seat"] != phone.told["seat"]
-        monkeypatch.setattr(wrong_codes, "WAITING", 1)
+        monkeypatch.setattr(limits, "MOST_LATE", 1)
         with ThreadPoolExecutor(8) as many:
             assert 429 in many.map(lambda k: get(f"{server.url}/v/more{k}")[0], range(8))
         assert eventually_200(right)
@@ -77,5 +77,5 @@ def test_what_is_remembered_has_bounds_and_is_forgotten() -> None:
     assert len(wrong._guesses) == ADDRESSES
     for k in range(FREE + 1):
         wrong.note("c", f"{k}")
-    waiting = [wrong.waits("c") for _ in range(WAITING + 1)]
-    assert [each.__enter__() for each in waiting] == [True] * WAITING + [False]
+    waiting = [wrong.waits("c") for _ in range(MOST_LATE + 1)]
+    assert [each.__enter__() for each in waiting] == [True] * MOST_LATE + [False]

@@ -16,8 +16,8 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Play
 from app.panels.run.classroom import Guesses
-from app.web.classroom import STEERING, Classroom, Watcher
 from app.web.passes import new_token
+from app.web.sessions import STEERING, Classroom, Watcher
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
@@ -53,7 +53,7 @@ def test_watchers_have_what_pages_use() -> None:
     """`Watcher` has every attribute of a learner that the code of a page uses."""
     used = {
         found
-        for folder in ("page", "panels", "view", "client/moment.py")
+        for folder in ("page", "panels", "tab", "view", "client/moment.py")
         for path in ([ROOT / folder] if folder.endswith(".py") else (ROOT / folder).rglob("*.py"))
         for found in re.findall(r"\blearner\.([a-z]\w*)", path.read_text())
     }

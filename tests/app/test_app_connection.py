@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from app.link.choice import SceneChoice
-from app.link.connection import hang_up, receive, send
 from app.link.messages import Reached
+from app.link.process import hang_up, receive, send
 from app.worker.simulation import SimulationRunner
 from lessons.scenes.run_spec import RunSpec
 

@@ -10,9 +10,9 @@ import pytest
 
 from app.link.choice import SceneChoice
 from app.link.messages import ContactPoint, Post
-from app.panels.torque.plots import touching
+from app.panels.run.plots import touching
 from app.view.robot import CoverView
-from app.view.world import ContactView, WorldView
+from app.view.surroundings import ContactView, WorldView
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import AS_PRINTED, RunSpec

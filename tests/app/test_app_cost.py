@@ -12,7 +12,7 @@ from served import served
 from viser import ClientHandle
 
 from app.adapter import private
-from app.client.decimated import decimate
+from app.client.recording import decimate
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
@@ -58,7 +58,7 @@ def test_a_page_that_nobody_sees_gets_no_pictures(alone: PageServer) -> None:
         assert wait_until(lambda: viewer.moves, LONG)
         viewer.tab = None
         (shown,) = (each._page for each in alone._visits.values() if each._page is not None)
-        assert wait_until(lambda: shown._stage is not None and shown._stage.page.in_view.asleep, LONG)
+        assert wait_until(lambda: shown._scene is not None and shown._scene.page.in_view.asleep, LONG)
         for _ in range(2):  # the last updates may still arrive in the first second
             viewer.second = Second()
             assert wait_until(lambda: viewer.second.messages >= 30, LONG)

@@ -10,8 +10,7 @@ import viser
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
-from app.web.answers import under_its_name
-from app.web.door import Answer, Door, as_origin
+from app.web.door import Answer, Door, as_origin, under_its_name
 from app.web.passes import (
     HEADER,
     QUERY,

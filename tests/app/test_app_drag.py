@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from queue import Queue
 from types import SimpleNamespace
@@ -20,16 +21,14 @@ from app.link.exercise import Lecture, LessonPlace
 from app.link.messages import Post, Ready
 from app.panels.torque.start import StartPanel
 from app.view import drag
-from app.view.drag import Hand, paused_words
+from app.view.drag import Hand, Question, Reachability, ReachabilityWorker, paused_words
 from app.view.goals import Goal
 from app.view.obstacles import _Solid
-from app.view.reachability import Question, Reachability, ReachabilityWorker
 from app.view.robot import gizmo_size, target_radius
-from app.view.targets import Targets
+from app.view.targets import Targets, draggable
 from app.worker.simulation import SimulationRunner
 from lessons.events import Event, MoveTarget
 from lessons.scenes.run_spec import RunSpec
-from lessons.settings.torque import TorqueSettings
 from robots.collision import Ball
 from robots.loading.load import load_urdf_text
 from robots.reach import ReachJudge
@@ -85,6 +84,33 @@ class Worker:
         self.asked.append(question)
 
 
+def page_of(
+    scene: Any, ready: Ready, post: Callable[..., object], later: Callable[..., object] = print
+) -> Any:
+    """Returns what the 3D view of a page needs."""
+    return SimpleNamespace(
+        client=SimpleNamespace(scene=scene),
+        ready=ready,
+        robot=ready.robot,
+        colours={},
+        settings=ready.settings,
+        post=post,
+        loop=SimpleNamespace(call_later=later),
+        poses_or_still=lambda: np.tile(TIP, (len(ready.robot.joint_names) + 1, 1)),
+    )
+
+
+def hand_in(
+    scene: Any, ready: Ready, post: Callable[..., object], clamp: bool, later: Callable[..., object]
+) -> Hand:
+    """Returns the dragged target of a scene."""
+    targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
+    position, orientation = draggable(ready.tasks)
+    assert position is not None
+    switch: Any = SimpleNamespace(value=clamp)
+    return Hand(page_of(scene, ready, post, later), position, orientation, targets, switch)
+
+
 class Held:
     """A dragged target with its scene and the events that it posted."""
 
@@ -94,17 +120,9 @@ class Held:
         self.scene: Any = Scene()
         self.targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
         self.start = self.targets["position"]
-        self.hand = Hand(
-            self.scene,
-            ready,
-            self.targets,
-            TIP,
-            0.2,
-            lambda *events: self.posted.append(events),
-            lambda: clamp,
-            lambda: None,
-            lambda seconds, then: self.waiting.append((seconds, then)),
-        )
+        post = lambda *events: self.posted.append(events)  # noqa: E731
+        later = lambda *call: self.waiting.append((call[0], partial(*call[1:])))  # noqa: E731
+        self.hand = hand_in(self.scene, ready, post, clamp, later)
         (self.judge,) = Worker.made
 
     def drag(self, place: np.ndarray) -> None:
@@ -257,10 +275,9 @@ def test_a_drag_that_arrives_while_its_handle_is_built_does_no_harm(ready: Ready
     Goal(scene, "hand", "xyz", JOINTS[0], np.zeros(3), 0.2, moved)
     _Solid(scene, 0, Ball("ball", (0.0, 0.0, 0.0), 0.1), moved)
     arms = SimulationRunner(SceneChoice(RunSpec("baxter-hold"))).ready()
-    Targets(scene, arms, {}, np.tile(TIP, (len(arms.robot.joint_names) + 1, 1)), 0.2, moved)
+    Targets(page_of(scene, arms, moved), arms.tasks, moved)
     assert moved.call_count == 4  # of the goal, of the obstacle, and of the two targets
-    targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
-    Hand(scene, ready, targets, TIP, 0.2, moved, lambda: True, moved, moved)
+    hand_in(scene, ready, moved, True, moved)
 
 
 def test_keys_move_and_turn_the_target_as_a_drag_does(held: Callable[[bool], Held]) -> None:
@@ -296,17 +313,16 @@ def test_a_line_with_its_length_leads_from_the_hand_to_a_small_target(
     one = held(False)
     ball, line, label = (one.scene.nodes[name] for name in ("/target/ball", "/way", "/target/label"))
     assert 0.025 <= ball.radius <= 0.03 and ball.opacity <= 0.5 and ball.color not in (*LEVELS, *JOINTS)
-    settings, row = ready.settings, np.full(ready.layout.size, np.nan)
-    assert isinstance(settings, TorqueSettings)
+    row = np.full(ready.layout.size, np.nan)
     for hand, words in (
         (one.start - [0.0, 0.123, 0.0], "123 mm to go"),
         (one.start, "target: pull an arrow"),
     ):
         row[ready.layout.fields["x/position"]] = hand
-        one.hand.show(MagicMock(), settings, row, ready.layout.fields, "")
+        one.hand.show(MagicMock(), row, "")
         assert label.text == words
         assert line.visible == ("to go" in words)
-    one.hand.show(MagicMock(), settings, row, ready.layout.fields, "paused: press Run")
+    one.hand.show(MagicMock(), row, "paused: press Run")
     assert label.text == "paused: press Run"
 
 

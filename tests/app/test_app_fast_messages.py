@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from viser import _messages
 
-from app.adapter.fast_messages import fast
+from app.adapter.private import fast
 
 SENT = (
     (_messages.SetPositionMessage, ("/robot/1", (0.1, -0.2, 0.3))),

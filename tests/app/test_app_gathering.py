@@ -9,10 +9,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.classes.gathering import MEMBERS, Gathering
-from app.classes.member import NAME
-from app.classes.table import table
-from app.classes.views import course, for_all, for_teacher
+from app.classes.gathering import MEMBERS, NAME, Gathering
+from app.classes.views import course, for_all, for_teacher, table
 from app.link.exercise import Lecture, LessonPlace
 from lessons.course import COURSE, load_lesson
 from lessons.teaching.prediction import Choice, Sketch, Value

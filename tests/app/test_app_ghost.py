@@ -16,10 +16,9 @@ from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.connection import receive, send
 from app.link.exercise import LessonPlace
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
-from app.link.process import wait_until
+from app.link.process import receive, send, wait_until
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
@@ -125,8 +124,8 @@ def test_a_ghost_begins_follows_and_ends(start: Start) -> None:
     assert ghost.settings is not None and ghost.settings.horizon == 1
     learner.send(Play(False))
     assert wait_until(lambda: together(learner), LONG)
-    mine = learner.score.result() if learner.score else None
-    its = ghost.score.result() if ghost.score else None
+    mine = learner.figures
+    its = ghost.figures
     assert mine is not None and its is not None and mine.seconds == pytest.approx(its.seconds, abs=1e-9)
     pid, before = ghost.pid, rings()
     learner.stop_ghost()

@@ -32,7 +32,7 @@ from app.web import limits
 from app.web.guard import FIRST_WORD, GuardedConnection
 from app.web.limits import Bucket, Budget, ConnectionLimits
 from app.web.passes import QUERY
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from app.web.visit import Visit
 from browsing.wire import camera, let_in, pack
 from lessons.own.files import Folder
@@ -197,7 +197,10 @@ def test_no_token_lets_everybody_in() -> None:
 def test_cookies_of_two_servers_live_in_one_jar() -> None:
     """A browser stores the cookies of both servers and sends both to each server; neither cookie opens the
     other server."""
-    servers = [PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1) for _ in range(2)]
+    servers = [
+        PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
+        for _ in range(2)
+    ]
     try:
         opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         for server in servers:
@@ -319,14 +322,14 @@ def test_no_process_stays_if_the_server_cannot_be_made(monkeypatch: pytest.Monke
     monkeypatch.setattr(module, "Sessions", Sessions)
     monkeypatch.setattr(private, "open_server", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        PageServer(SceneChoice(RunSpec("planar3-hold")), port=0)
+        PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0))
     (sessions,) = made
     assert sessions.enter([]) is None and not sessions.learners
 
 
 def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogCaptureFixture) -> None:
     """The server is closed while it still waits for the page's answer about its local storage."""
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
     with dial(server) as page:
         page.send(pack(camera()))
         assert wait_until(lambda: server.guard.taken > 0, LONG)
@@ -361,7 +364,7 @@ def test_a_page_that_comes_while_the_server_closes_leaves_no_noise(
     monkeypatch.setattr(Visit, "arrive", late)
     monkeypatch.setattr(Visit, "leave", leaves)
     monkeypatch.setattr(private, "stop", stops)
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
     with dial(server) as page:
         page.send(pack(camera()))
         assert came.wait(LONG)

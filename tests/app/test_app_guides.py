@@ -12,8 +12,8 @@ from app.html.palette import css, level_colours
 from app.link.messages import TaskView
 from app.panels.torque.start import guide, spoken
 from app.panels.velocity.start import guide as velocity_guide
-from app.view.coordinates import draggable
-from app.worker.reports.start import TorqueRun, start
+from app.view.targets import draggable
+from app.worker.simulation import TorqueRun, start
 from himpc.htmpc import base_joints
 from himpc.stack import Level
 from lessons.course import load_lesson

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from app.client.progress import Notebook
-from app.html.glossary import explained, words
-from app.html.markdown import rendered, rendered_line, split, word_count
+from app.html.markdown import explained, rendered, rendered_line, split, word_count, words
 from app.html.palette import GHOST
 from app.html.text import figure, joints_named, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve

@@ -20,7 +20,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.web.load import Load, report
 from app.web.passes import HEADER
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from browsing.wire import Wire, eventually
 from lessons.events import Set
 from lessons.replay.state import State, decode, encode
@@ -136,8 +136,8 @@ def test_a_code_is_opened_on_a_thread_of_the_page(
         ran.append(threading.current_thread())
         return decode(code)
 
-    monkeypatch.setattr("app.panels.run.share.decode", noted)
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    monkeypatch.setattr("app.panels.run.export.decode", noted)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
     loops: list[threading.Thread] = []
     server._viser.get_event_loop().call_soon_threadsafe(lambda: loops.append(threading.current_thread()))
     try:

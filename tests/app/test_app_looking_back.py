@@ -12,10 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from app.client.decimated import KEPT, WINDOW, History
-from app.client.pose_history import Frame, PoseHistory
-from app.client.rows import MOST, RowHistory
-from app.client.run_statistics import RunStatistics
+from app.client.recording import KEPT, MOST, WINDOW, Frame, History, PoseHistory, RowHistory, RunStatistics
 from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.view.pull import Grip, pulled, push_at
@@ -193,12 +190,11 @@ def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
 
 @pytest.fixture(scope="module")
 def run(body: SimulationRunner) -> Recorded:
-    record = RowHistory(body.session.layout)
-    history = History(body.block, body.session.layout, record.take)
+    history = History(body.block, body.session.layout)
     for _ in range(6):
         body.tick(50)
         history.pull()
-    return Recorded(record.layout, record.whole())
+    return Recorded(history.layout, history.rows.whole())
 
 
 def test_files_hold_what_was_recorded(body: SimulationRunner, run: Recorded) -> None:

@@ -11,8 +11,7 @@ import pytest
 from served import served
 from viser import _messages
 
-from app.page.comfort import MOTION, REDUCED
-from app.panels.run.narration import AT_MOST_EVERY, Facts, Narration
+from app.page.comfort import AT_MOST_EVERY, MOTION, REDUCED, Facts, Narration
 from browsing.wire import Wire, eventually
 
 STILL = Facts(True, 0, (("position", True), ("posture", True)), {"position": (0.0, "m")}, frozenset())

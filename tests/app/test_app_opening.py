@@ -15,7 +15,7 @@ import pytest
 from served import served
 
 from app.link.process import wait_until
-from app.web.address import seen_from_outside
+from app.web.server import seen_from_outside
 from app.web.serving import greeting, opened_in_a_browser
 from lessons.own.files import Folder
 

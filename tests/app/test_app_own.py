@@ -15,8 +15,8 @@ from served import served
 from app.link.choice import SceneChoice
 from app.link.messages import Lead, Load, LoadRefused, Post, Ready
 from app.link.process import wait_until
+from app.worker import torque
 from app.worker.ghost import GhostBody
-from app.worker.reports import own_code
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from lessons.authoring.new import text_of
@@ -62,7 +62,7 @@ def test_what_a_test_of_another_file_finds_says_nothing_about_this_file(
         assert go_on.wait(LONG)
         return judged(code)
 
-    monkeypatch.setattr(own_code, "judged", waiting)
+    monkeypatch.setattr(torque, "judged", waiting)
     for saved in ("def broken(:\n", HOLDS + "# saved\n"):
         go_on.clear()
         body.handle(Post(Set("controller", str(file))))

@@ -19,9 +19,9 @@ from websockets.sync.client import connect
 from app.adapter import private
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.web.classroom import Classroom
 from app.web.guard import GuardedConnection
 from app.web.server import PageServer
+from app.web.sessions import Classroom
 from browsing.wire import Wire, camera, eventually, let_in, pack
 from lessons.own.files import Folder
 from lessons.scenes.run_spec import RunSpec

@@ -11,10 +11,10 @@ import pytest
 from lxml import etree
 
 from app.html.palette import LEVELS
-from app.link.inside import Inside, InsideRequest
+from app.link.messages import Inside, InsideRequest
 from app.panels.inside import matrix as hessian
-from app.panels.inside import spectrum
 from app.panels.inside.inside import InsideSubscription
+from app.panels.inside.matrix import spectrum_markup
 from app.panels.inside.plane import half_width, parts
 from lessons.events import MoveTarget
 from lessons.geometry.look import matrix_of, plane_of
@@ -101,13 +101,13 @@ def test_the_hessian_marks_what_holds_the_solution(session: TorqueSession) -> No
 
 
 def test_eigenvalues_stand_on_the_real_axis() -> None:
-    root = parsed(spectrum.markup([0.98, 0.2, -1.3, -50.0]))
+    root = parsed(spectrum_markup([0.98, 0.2, -1.3, -50.0]))
     marks = root.findall(".//circle[@class='eigenvalue']")
     x = [float(mark.get("cx", "")) for mark in marks]
     assert x == sorted(x, reverse=True) and x[0] - 180.0 == pytest.approx(0.98 * 78.0, abs=0.1)
     assert min(x) >= 0.0 and {mark.get("cy") for mark in marks} == {"92.0"}
     assert "grows" in "".join(str(text) for text in root.itertext())
-    parsed(spectrum.markup([math.nan, math.inf]))
+    parsed(spectrum_markup([math.nan, math.inf]))
 
 
 def test_a_wish_is_sent_once_and_again_if_nothing_comes_of_it(monkeypatch: pytest.MonkeyPatch) -> None:

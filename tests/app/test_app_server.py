@@ -15,7 +15,7 @@ import pytest
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.web import server
-from app.web.server import FIRST, PageServer
+from app.web.server import FIRST, PageServer, ServerOptions
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -28,17 +28,17 @@ def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(InputError, match=r"in use.*--port"):
-            PageServer(FIRST, port=port)
+            PageServer(FIRST, ServerOptions(port=port))
     with pytest.raises(InputError, match="--host"):
-        PageServer(FIRST, host="203.0.113.7", port=0)
+        PageServer(FIRST, ServerOptions(host="203.0.113.7", port=0))
     with pytest.raises(InputError, match="Port 70000"):
-        PageServer(FIRST, port=70_000)
+        PageServer(FIRST, ServerOptions(port=70_000))
     with pytest.raises(InputError, match="iiwa14-hold"):
-        PageServer(SceneChoice(RunSpec("iiwa14-hodl")))
+        PageServer(SceneChoice(RunSpec("iiwa14-hodl")), ServerOptions())
     with pytest.raises(InputError):
-        PageServer(SceneChoice(RunSpec("hold", "/nowhere.urdf")))
+        PageServer(SceneChoice(RunSpec("hold", "/nowhere.urdf")), ServerOptions())
     with pytest.raises(InputError, match="1 or more"):
-        PageServer(FIRST, max_sessions=0)
+        PageServer(FIRST, ServerOptions(max_sessions=0))
 
 
 def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -47,15 +47,15 @@ def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.
         taken.listen()
         monkeypatch.setattr(server, "check_address", lambda *_: None)
         with pytest.raises(InputError, match="is in use"):
-            PageServer(FIRST, port=taken.getsockname()[1], max_sessions=1)
+            PageServer(FIRST, ServerOptions(port=taken.getsockname()[1], max_sessions=1))
 
 
 def test_one_line_and_a_clean_end() -> None:
     """After SIGTERM; Ctrl-C is in test_commands_interrupted.py."""
     code = (
-        "import app.commands.early, sys; from app.web.server import FIRST, PageServer; "
+        "import app.commands.early, sys; from app.web.server import FIRST, PageServer, ServerOptions; "
         "from app.web.serving import serve; "
-        "sys.exit(serve(PageServer(FIRST, port=0), open_browser=False))"
+        "sys.exit(serve(PageServer(FIRST, ServerOptions(port=0)), open_browser=False))"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code],

@@ -30,9 +30,9 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.process import wait_until
-from app.web import place
 from app.web.passes import HEADER, QUERY
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
+from app.web.visit import place_read, place_written
 from browsing.tab import Storage, opened
 from browsing.wire import Wire, camera, eventually, pack
 from lessons.own.files import Folder
@@ -76,10 +76,7 @@ def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
     origin = f"https://{NAME}:{port}"
     server = PageServer(
         SceneChoice(RunSpec("planar3-hold")),
-        port=0,
-        max_sessions=1,
-        trusted_origins=[origin],
-        own_files=Folder.at(str(folder)),
+        ServerOptions(port=0, max_sessions=1, trusted_origins=[origin], own_files=Folder.at(str(folder))),
     )
     printed = re.findall(r"```nginx\n(.*?)```", PAGE.read_text(), re.DOTALL)
     assert len(printed) == 1
@@ -189,12 +186,10 @@ def test_phones_need_no_password_and_get_no_account(nginx: str, tmp_path: Path) 
         users.write("prof:{PLAIN}right\n")
     os.chmod(users.name, 0o644)
     server = PageServer(
-        *(SceneChoice(RunSpec("planar3-hold")), "127.0.0.1", 0),
-        max_sessions=1,
-        token=token,
-        class_names=True,
-        proxy_only=True,
-        trusted_origins=[origin],
+        SceneChoice(RunSpec("planar3-hold")),
+        ServerOptions(
+            port=0, max_sessions=1, token=token, class_names=True, proxy_only=True, trusted_origins=[origin]
+        ),
     )
     (site,) = re.findall(r"```text\n(location / .*?)```", PAGE.read_text(), re.DOTALL)
     for text, here, times in (
@@ -242,12 +237,9 @@ def balanced(nginx: str, folder: Path, servers: int) -> Iterator[tuple[str, list
     running = [
         PageServer(
             SceneChoice(RunSpec("planar3-hold")),
-            port=0,
-            max_sessions=1,
-            grace=0.5,
-            trusted_origins=[origin],
-            token=token,
-            refers=True,
+            ServerOptions(
+                port=0, max_sessions=1, grace=0.5, trusted_origins=[origin], token=token, refers=True
+            ),
         )
         for _ in range(servers)
     ]
@@ -358,10 +350,10 @@ def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
     opened, and only for a server that was started with the same scene."""
     start = SceneChoice(RunSpec("planar3-hold"))
     step = SceneChoice.of_lesson(LessonPlace.at("one-task", 2))
-    right = place.written(step, "", start)
-    assert place.read(right, start) == step
-    assert place.read(right, step) is None
-    assert place.read(text.replace('"S"', json.dumps(json.loads(right)["start"])), start) is None
+    right = place_written(step, "", start)
+    assert place_read(right, start) == step
+    assert place_read(right, step) is None
+    assert place_read(text.replace('"S"', json.dumps(json.loads(right)["start"])), start) is None
 
 
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,7 +32,7 @@ from lessons.scenes.run_spec import RunSpec
 from app.web import server
 from browsing.wire import let_in
 server._load_on_thread = lambda choice: None  # what follows once it listens
-running = server.PageServer({{choice}}, port=0)
+running = server.PageServer({{choice}}, server.ServerOptions(port=0))
 try:
     page = urllib.request.Request(running.url, headers={{"Cookie": let_in(running.link)}})
     assert urllib.request.urlopen(page).status == 200
@@ -46,9 +46,9 @@ SHOWN = """
 import sys
 from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from browsing.wire import Wire, eventually
-running = PageServer(SceneChoice(RunSpec("{scene}")), port=0, class_names={named})
+running = PageServer(SceneChoice(RunSpec("{scene}")), ServerOptions(port=0, class_names={named}))
 try:
     with Wire(running.guest_link) as page:
         assert eventually(lambda: page.shows("Running"), 110.0)

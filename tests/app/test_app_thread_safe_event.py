@@ -8,7 +8,7 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from app.adapter.thread_safe_event import ThreadSafeEvent
+from app.adapter.private import ThreadSafeEvent
 
 
 class Meeting(deque[Any]):

@@ -8,7 +8,7 @@ from unittest.mock import MagicMock
 
 import numpy as np
 
-from app.view.turns import JointTurns
+from app.view.robot import JointTurns
 
 
 def recording(*rows: tuple[float, float, float]) -> Any:

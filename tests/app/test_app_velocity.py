@@ -11,15 +11,14 @@ import numpy as np
 import pytest
 from served import served
 
-from app.client.decimated import History
+from app.client.recording import History
 from app.html.text import free_name
 from app.link.choice import SceneChoice
-from app.link.messages import Play, Post, Ready, ResetAll, Status, StepTicks
-from app.link.mission_view import MissionView
-from app.panels.velocity.plots import TrackingPlots
-from app.panels.velocity.tasks import RolesPanel
+from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, StepTicks
+from app.panels.run.plots import PlotsPanel, velocity_plots
+from app.panels.velocity.mission import RolesPanel
 from app.view.goals import open_row
-from app.worker.pacing import BACKLOG, Pacer
+from app.worker.main import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from himpc import Level
@@ -257,9 +256,9 @@ def test_a_chart_whose_first_curve_has_no_values_draws_the_others(body: Simulati
     gui = MagicMock()
     in_view = MagicMock(sees=lambda title: title.startswith("Error"))
     ready = body.ready()
-    page = MagicMock(gui=gui, in_view=in_view, ready=ready, robot=ready.robot)
+    page = MagicMock(gui=gui, in_view=in_view, ready=ready, robot=ready.robot, settings=ready.settings)
     page.colours = dict.fromkeys(("ee", "base"), (0, 0, 0))
-    plots = TrackingPlots(page)
+    plots = PlotsPanel(page, velocity_plots)
     note = gui.add_html.return_value
     note.visible = False
     layout, drawn = body.session.layout, gui.add_uplot.return_value
@@ -269,7 +268,7 @@ def test_a_chart_whose_first_curve_has_no_values_draws_the_others(body: Simulati
         history = History(body.block, layout)
         history.pull()
         for _ in range(12):
-            plots.draw(history.window(), None, 0.1)
+            plots.draw(history.window(), None)
 
     body.handle(Post(RemoveTask("ee")))
     draw(0)
@@ -287,7 +286,7 @@ def test_a_level_has_its_name_on_the_page_as_it_is(
     assert isinstance(settings, VelocitySettings)
     tasks = [replace(level.tasks[0], name=f"<{level.name}>") for level in settings.levels]
     page.settings = MagicMock(levels=[Level((task,)) for task in tasks])
-    monkeypatch.setattr("app.panels.velocity.tasks.Controls", MagicMock())
+    monkeypatch.setattr("app.panels.velocity.mission.Controls", MagicMock())
     RolesPanel(page, None)
     labels = [call.args[0] for call in page.gui.add_folder.call_args_list if call.args[0]]
     assert labels == ["Settings of <ee>", "Settings of <base>"]

@@ -18,13 +18,13 @@ from served import served
 from viser import _messages
 from viser.infra._messages import wire_field_names
 
-from app.client.decimated import History
+from app.client.recording import History
 from app.link.choice import SceneChoice
-from app.panels.context import PageContext
-from app.panels.widgets.mirror import Bindings
+from app.tab.context import PageContext
+from app.tab.mirror import Bindings
 from app.view.camera import look, turn
 from app.view.robot import aim
-from app.web import words
+from app.web import inlet
 from app.worker.simulation import SimulationRunner
 from benchmarks.hostile import attack
 from browsing.wire import Wire, camera, eventually
@@ -57,7 +57,7 @@ def said(kind: object, *parts: dict[str, Any]) -> bytes:
 
 
 @pytest.mark.parametrize(
-    "kind", [*words.Small.__args__, *words.File.__args__], ids=lambda kind: kind.__name__
+    "kind", [*inlet.Small.__args__, *inlet.File.__args__], ids=lambda kind: kind.__name__
 )
 def test_every_word_is_one_of_visers(kind: Any) -> None:
     """Every message class has exactly the fields of viser's class."""
@@ -78,7 +78,7 @@ def test_every_word_is_one_of_visers(kind: Any) -> None:
     ],
 )
 def test_what_a_page_says_is_taken(kind: str, parts: dict[str, Any]) -> None:
-    assert words.refusal(said(kind, CAMERA if kind.startswith("Viewer") else {}, parts)) is None
+    assert inlet.refusal(said(kind, CAMERA if kind.startswith("Viewer") else {}, parts)) is None
 
 
 @pytest.mark.parametrize(
@@ -108,12 +108,12 @@ def test_what_a_page_says_is_taken(kind: str, parts: dict[str, Any]) -> None:
     ],
 )  # fmt: skip
 def test_everything_else_is_refused(kind: str | None, parts: dict[str, Any]) -> None:
-    assert words.refusal(said(kind, CAMERA if str(kind).startswith("Viewer") else {}, parts)) is not None
+    assert inlet.refusal(said(kind, CAMERA if str(kind).startswith("Viewer") else {}, parts)) is not None
 
 
 @pytest.mark.parametrize("raw", [b"", b"\xc1", b"\x91" * 100_000, b"\x80", said("x")[:-1]])
 def test_what_is_no_message_is_refused(raw: bytes) -> None:
-    assert words.refusal(raw) is not None
+    assert inlet.refusal(raw) is not None
 
 
 # ---------------------------------------------------------------- a page
@@ -265,8 +265,9 @@ def test_poses_of_another_scene_are_none_of_this_page(monkeypatch: pytest.Monkey
     learner = SimpleNamespace(ready=now, read=lambda look: look(block, None))
     ready = SimpleNamespace(robot=robot)
     mock = MagicMock()
-    monkeypatch.setattr("app.panels.context.InView", mock)  # it sends a script to the browser
-    page = PageContext(mock, learner, ready, {}, mock, False, mock, mock)  # pyright: ignore[reportArgumentType]
+    monkeypatch.setattr("app.tab.context.InView", mock)  # it sends a script to the browser
+    made: Any = (mock, learner, ready, {}, mock, False, mock, mock, None, mock)
+    page = PageContext(*made)
     assert page.poses() is None
     assert page.poses_or_still().shape == (robot.n + 1, 7)
     learner.ready = ready

@@ -25,7 +25,7 @@ from typing import Any
 import pytest
 
 from app.__main__ import main
-from app.commands.autograder import PACKAGES, requirements
+from app.commands.grade import PACKAGES, requirements
 from lessons.exercises import start_of
 from lessons.exercises.result import CheckResult, Grade, github, gradescope
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
 from app.link.messages import Play
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
 from browsing.wire import Wire, eventually
 from lessons.course import COURSE, load_lesson
 from lessons.scenes.names import ALL_SCENES
@@ -69,7 +69,7 @@ def main(task: str, folder: Path, *names: str) -> int:
     """Returns the number of records that differ; 0 after `store`."""
     folder.mkdir(parents=True, exist_ok=True)
     server = PageServer(
-        SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=1, grace=0.0, ask_token=False
+        SceneChoice(RunSpec("iiwa14-hold")), ServerOptions(port=0, max_sessions=1, grace=0.0, ask_token=False)
     )
     different = 0
     for name, choice in places():

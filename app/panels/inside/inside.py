@@ -8,12 +8,10 @@ from dataclasses import replace
 
 from app.client.moment import Moment
 from app.html.text import block
-from app.link.inside import Inside, InsideRequest
-from app.link.messages import Status
-from app.panels.context import PageContext
-from app.panels.inside.matrix import MatrixPanel
+from app.link.messages import Inside, InsideRequest, Status
+from app.panels.inside.matrix import MatrixPanel, SpectrumPicture
 from app.panels.inside.plane import PlanePanel
-from app.panels.inside.spectrum import SpectrumPicture
+from app.tab.context import PageContext
 from lessons.settings.torque import TorqueSettings
 
 _AGAIN = 0.4
@@ -40,11 +38,7 @@ class InsideSubscription:
 class InsidePanel:
     """The tab *Inside*. It requests only the data of pictures that the browser shows."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        spectrum: SpectrumPicture,
-    ) -> None:
+    def __init__(self, page: PageContext, spectrum: SpectrumPicture) -> None:
         """spectrum: the picture beside the controls of M̄."""
         gui, levels = page.gui, tuple(dict.fromkeys(task.level for task in page.ready.tasks))
         self._plane: PlanePanel | None = None
@@ -68,7 +62,6 @@ class InsidePanel:
         self._spectrum.draw(moment.status.inside)
 
     def write(self, status: Status, settings: TorqueSettings) -> None:
-        """Updates the texts about the pictures."""
         if self._plane is not None:
             self._plane.write(status.inside, settings)
         self._matrix.write(status.inside)

@@ -1,15 +1,22 @@
-"""The Hessian of one level's QP as a heat map, with marks at the active bounds."""
+"""Pictures of matrices: the Hessian of one level's QP as a heat map, with marks at the active bounds, and the
+eigenvalues of I − M⁻¹M̄ beside the unit circle."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from app.html.palette import BAD, BOUND, LEVELS, css, ink
+import numpy as np
+import viser
+
+from app.html.palette import BAD, BOUND, GOOD, LEVELS, css, ink
+from app.html.svg import element, path, text
 from app.html.text import block, esc, figure, joint_labels
-from app.link.inside import Inside
-from app.panels.context import PageContext
+from app.link.messages import Inside
 from app.panels.widgets.picture import SvgPicture
+from app.tab.context import PageContext
+from app.tab.in_view import InView
 
 if TYPE_CHECKING:
     from lessons.geometry.matrix import Matrix
@@ -39,7 +46,6 @@ class MatrixPanel:
         return str(self._level.value) if self._picture.in_view else None
 
     def draw(self, inside: Inside | None) -> None:
-        """Draws the data that the simulation sent."""
         if inside is not None and inside.matrix is not None and self._picture.in_view:
             self._picture.paint([markup(inside.matrix, self._names)])
 
@@ -48,8 +54,7 @@ class MatrixPanel:
         if inside is None or not self._picture.in_view:
             return
         words = block(esc(inside.why_not)) if inside.matrix is None else _legend(inside.matrix, self._names)
-        if self._words.content != words:
-            self._words.content = words
+        self._words.content = words
 
 
 def markup(matrix: Matrix, names: Sequence[str]) -> str:
@@ -68,26 +73,23 @@ def markup(matrix: Matrix, names: Sequence[str]) -> str:
                 paths.setdefault(step, []).append(f"M{x:.1f} {y:.1f}h{wide:.1f}v{cell:.1f}h{-wide:.1f}Z")
             start = column
     parts = [
-        f'<path d="{"".join(pieces)}" fill="{css(LEVELS[int(step > 0)], abs(step) / _SHADES)}"/>'
+        path("".join(pieces), fill=css(LEVELS[int(step > 0)], abs(step) / _SHADES))
         for step, pieces in sorted(paths.items())
     ]
-    frame = (
-        f'<rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}" fill="none" stroke="{css(BOUND)}"/>'
-    )
     lines = "".join(
         f"M{_LEFT + at:.1f} {_TOP}v{_SIDE}M{_LEFT} {_TOP + at:.1f}h{_SIDE}"
         for at in (knot * matrix.joints * cell for knot in range(1, matrix.shown))
     )
-    parts += [frame, f'<path d="{lines}" stroke="{css(BOUND, 0.7)}"/>', _labels(matrix, names, cell)]
+    square: dict[str, Any] = {"x": _LEFT, "y": _TOP, "width": _SIDE, "height": _SIDE}
+    parts.append(element("rect", **square, fill="none", stroke=css(BOUND)))
+    parts += [path(lines, stroke=css(BOUND, 0.7)), _labels(matrix, names, cell)]
     for active in {(each.knot, each.joint) for each in matrix.active if each.knot < matrix.shown}:
         at = _TOP + (active[0] * matrix.joints + active[1] + 0.5) * cell
         x = _LEFT + at - _TOP
-        parts.append(
-            f'<g class="active" fill="{css(BAD)}"><path d="M{_LEFT - 1} {at:.1f}l-8 -4v8Z"/>'
-            f'<path d="M{x:.1f} {_TOP + _SIDE + 1}l-4 8h8Z"/></g>'
-            f'<path d="M{_LEFT} {at:.1f}h{_SIDE}M{x:.1f} {_TOP}v{_SIDE}" stroke="{css(BAD)}" '
-            'stroke-width="0.8"/>'
-        )
+        arrows = path(f"M{_LEFT - 1} {at:.1f}l-8 -4v8Z") + path(f"M{x:.1f} {_TOP + _SIDE + 1}l-4 8h8Z")
+        parts.append(element("g", arrows, class_="active", fill=css(BAD)))
+        cross = f"M{_LEFT} {at:.1f}h{_SIDE}M{x:.1f} {_TOP}v{_SIDE}"
+        parts.append(path(cross, stroke=css(BAD), stroke_width=0.8))
     return "".join(parts)
 
 
@@ -98,26 +100,18 @@ def _step(shade: int) -> int:
 
 def _labels(matrix: Matrix, names: Sequence[str], cell: float) -> str:
     """Labels of the rows and columns: the joints if only one knot is shown, otherwise the knots."""
-    parts = []
     if matrix.shown == 1:
-        for joint, name in enumerate(names):
-            at = (joint + 0.5) * cell
-            short = esc(name if len(name) <= 8 else f"{joint + 1}")
-            parts.append(f'<text x="{_LEFT - 12}" y="{_TOP + at + 4:.1f}" text-anchor="end">{short}</text>')
-            parts.append(
-                f'<text x="{_LEFT + at:.1f}" y="{_TOP + _SIDE + 21}" text-anchor="middle">{short}</text>'
-            )
+        size, words = cell, "joint by joint"
+        short = [name if len(name) <= 8 else f"{joint + 1}" for joint, name in enumerate(names)]
+        labels = [(name, name) for name in short]
     else:
-        for knot in range(matrix.shown):
-            at = (knot + 0.5) * matrix.joints * cell
-            parts.append(
-                f'<text x="{_LEFT - 12}" y="{_TOP + at + 4:.1f}" text-anchor="end">Δτ, {knot}</text>'
-                f'<text x="{_LEFT + at:.1f}" y="{_TOP + _SIDE + 21}" text-anchor="middle">{knot}</text>'
-            )
-    words = "joint by joint" if matrix.shown == 1 else "knot by knot, and for each knot joint by joint"
-    parts.append(
-        f'<text x="{_LEFT + 0.5 * _SIDE}" y="{_TOP + _SIDE + 37}" text-anchor="middle">Δτ, {words}</text>'
-    )
+        size, words = matrix.joints * cell, "knot by knot, and for each knot joint by joint"
+        labels = [(f"Δτ, {knot}", f"{knot}") for knot in range(matrix.shown)]
+    parts = [text(_LEFT + 0.5 * _SIDE, _TOP + _SIDE + 37, f"Δτ, {words}", "middle")]
+    for k, (left, below) in enumerate(labels):
+        at = (k + 0.5) * size
+        parts.append(text(_LEFT - 12, _TOP + at + 4, left, "end"))
+        parts.append(text(_LEFT + at, _TOP + _SIDE + 21, below, "middle"))
     return "".join(parts)
 
 
@@ -137,3 +131,76 @@ def _legend(matrix: Matrix, names: Sequence[str]) -> str:
         + (f'<b style="color:{ink(BAD)}">Red: active bounds</b>{held}' if held else "No bound is active.")
         + (f"<br>… and {more} more." if more > 0 else "")
     )
+
+
+EIGENVALUES = "Eigenvalues of I − M⁻¹M̄"
+_SPECTRUM_SIZE = (360, 208)
+_MIDDLE, _RADIUS = (180.0, 92.0), 78.0
+_EDGE = 2.2  # half the width of the picture, in radii of the unit circle
+
+
+class SpectrumPicture:
+    """The picture of the eigenvalues. It requests them while the browser shows the picture."""
+
+    def __init__(self, client: viser.ClientHandle, in_view: InView) -> None:
+        self._picture = SvgPicture(
+            client,
+            in_view,
+            EIGENVALUES,
+            _SPECTRUM_SIZE,
+            "Run (Space), or take one tick (T), to see the eigenvalues.",
+        )
+
+    @property
+    def in_view(self) -> bool:
+        return self._picture.in_view
+
+    def draw(self, inside: Inside | None) -> None:
+        if inside is not None and inside.spectrum is not None and self.in_view:
+            self._picture.paint([spectrum_markup(inside.spectrum)])
+
+
+def spectrum_markup(values: np.ndarray | Sequence[float]) -> str:
+    """Returns SVG with a mark for each eigenvalue; all eigenvalues are real. Marks outside the picture are
+    drawn at its edge. The attribute data-at contains the value."""
+    x0, y0 = _MIDDLE
+    far, high = _EDGE * _RADIUS, _RADIUS + 8
+    axes = f"M{x0 - far:.0f} {y0}H{x0 + far:.0f}M{x0} {y0 - high}v{2 * high}"
+    parts = [
+        element("circle", cx=x0, cy=y0, r=_RADIUS, fill=css(GOOD, 0.08), stroke=css(BOUND)),
+        path(axes, stroke=css(BOUND, 0.6)),
+        text(x0 - _RADIUS - 5, y0 + 14, "−1", "end"),
+        text(x0 + _RADIUS + 5, y0 + 14, "1"),
+        text(x0 - 4, y0 + 14, "0", "end"),
+    ]
+    known = [float(value) for value in values if math.isfinite(value)]
+    parts += [
+        element(
+            "circle",
+            class_="eigenvalue",
+            data_at=f"{value:.6g}",
+            cx=x0 + _RADIUS * min(max(value, -_EDGE), _EDGE),
+            cy=y0,
+            r=4.5,
+            fill=css(GOOD if abs(value) < 1.0 else BAD, 0.75),
+            stroke="currentColor",
+            stroke_width=0.7,
+        )
+        for value in known
+    ]
+    verdict = _verdict(max(known, key=abs, default=math.nan))
+    parts.append(text(x0, _SPECTRUM_SIZE[1] - 18, verdict, "middle", font_weight=600))
+    says = "Each tick multiplies each part of the error by its eigenvalue."
+    parts.append(text(x0, _SPECTRUM_SIZE[1] - 4, says, "middle"))
+    return "".join(parts)
+
+
+def _verdict(worst: float) -> str:
+    figure = f"{worst:.3g}".replace("-", "−")
+    if math.isnan(worst):
+        return "not finite"
+    if worst < -1.0:
+        return f"{figure}: the error grows and changes sign at every tick"
+    if worst >= 1.0:
+        return f"{figure}: the error does not decay"
+    return f"largest {figure}: " + ("slow" if worst > 0 else "the sign changes at every tick")

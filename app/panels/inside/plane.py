@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from app.client.moment import Moment
 from app.html.palette import BAD, BOUND, GHOST, RGB, css, ink
+from app.html.svg import element, path, text
 from app.html.text import block, esc, figure, joint_labels, swatch
-from app.link.inside import Inside, InsideRequest
-from app.panels.context import PageContext
+from app.link.messages import Inside, InsideRequest
 from app.panels.widgets.command import on_click
 from app.panels.widgets.picture import SvgPicture
+from app.tab.context import PageContext
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 SIZE = (420, 408)
 _LEFT, _TOP, _SIDE = 50.0, 10.0, 360.0
+_SQUARE: dict[str, Any] = {"x": _LEFT, "y": _TOP, "width": _SIDE, "height": _SIDE}
 _FAR = 6.0
 """The largest factor by which the unconstrained optimum of a level enlarges the picture."""
 _SMALLEST = 0.12  # N·m: half the width at the largest magnification
@@ -88,16 +90,15 @@ def parts(plane: Plane, half: float, colours: Mapping[str, RGB], joints: Sequenc
     """Returns SVG layers that change at different times, from back to front. joints: names of the joint of
     the horizontal axis and of the joint of the vertical axis."""
     paper = _Paper(half)
-    clip = f'<clipPath id="plane"><rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}"/></clipPath>'
+    clip = element("clipPath", element("rect", **_SQUARE), id="plane")
     inner = [_box(plane, paper)]
     for place, level in reversed(list(enumerate(plane.levels[:CONTOURED]))):
         inner.append(_contours(level, place, paper, colours))
     for place, level in enumerate(plane.levels[: max(len(plane.levels) - 1, 1)]):
         inner.append(_left(level, plane, place, paper, colours))
-    clipped = [f'<g clip-path="url(#plane)">{each}</g>' for each in inner]
     return [
-        f"<defs>{clip}</defs>{_axes(paper, joints)}",
-        *clipped,
+        element("defs", clip) + _axes(paper, joints),
+        *(element("g", each, clip_path="url(#plane)") for each in inner),
         _sides(plane, paper),
         *_points(plane, paper, colours),
     ]
@@ -107,26 +108,20 @@ def parts(plane: Plane, half: float, colours: Mapping[str, RGB], joints: Sequenc
 
 
 def _axes(paper: _Paper, joints: Sequence[str]) -> str:
-    parts = [
-        f'<rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}" fill="none" '
-        f'stroke="{css(BOUND, 0.5)}"/>'
-    ]
+    parts = [element("rect", **_SQUARE, fill="none", stroke=css(BOUND, 0.5))]
     bottom = _TOP + _SIDE
     for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
         value = share * paper.half
         x, y = paper.x(value), paper.y(value)
         words = f"{value:.4g}".replace("-", "−")
-        line = f'stroke="{css(BOUND, 0.6 if share == 0 else 0.2)}"'
-        parts.append(f'<path d="M{x:.1f} {_TOP}V{bottom}M{_LEFT} {y:.1f}H{_LEFT + _SIDE}" {line}/>')
-        anchor = "end" if share == 1.0 else "start" if share == -1.0 else "middle"
-        parts.append(f'<text x="{x:.1f}" y="{bottom + 14}" text-anchor="{anchor}">{words}</text>')
-        parts.append(f'<text x="{_LEFT - 4}" y="{y + 4:.1f}" text-anchor="end">{words}</text>')
-    across, up = (esc(name) for name in joints)
-    middle = _TOP + 0.5 * _SIDE
-    parts.append(
-        f'<text x="{_LEFT + 0.5 * _SIDE}" y="{bottom + 31}" text-anchor="middle">Δτ of {across}, N·m</text>'
-        f'<text transform="translate(11 {middle}) rotate(-90)" text-anchor="middle">Δτ of {up}, N·m</text>'
-    )
+        cross = f"M{x:.1f} {_TOP}V{bottom}M{_LEFT} {y:.1f}H{_LEFT + _SIDE}"
+        parts.append(path(cross, stroke=css(BOUND, 0.6 if share == 0 else 0.2)))
+        parts.append(text(x, bottom + 14, words, {1.0: "end", -1.0: "start"}.get(share, "middle")))
+        parts.append(text(_LEFT - 4, y + 4, words, "end"))
+    across, up = joints
+    parts.append(text(_LEFT + 0.5 * _SIDE, bottom + 31, f"Δτ of {across}, N·m", "middle"))
+    upwards = f"translate(11 {_TOP + 0.5 * _SIDE}) rotate(-90)"
+    parts.append(text(0, 0, f"Δτ of {up}, N·m", "middle", transform=upwards))
     return "".join(parts)
 
 
@@ -142,10 +137,8 @@ def _box(plane: Plane, paper: _Paper) -> str:
         return ""
     around = f"M{_LEFT} {_TOP}h{_SIDE}v{_SIDE}h{-_SIDE}Z"
     inside = f"M{left:.1f} {top:.1f}V{bottom:.1f}H{right:.1f}V{top:.1f}Z"
-    return (
-        f'<path d="{around}{inside}" fill="{css(BAD, 0.09)}" fill-rule="evenodd"/>'
-        f'<path d="{inside}" fill="none" stroke="{css(BAD)}" stroke-width="1.6" class="box"/>'
-    )
+    outside = path(around + inside, fill=css(BAD, 0.09), fill_rule="evenodd")
+    return outside + path(inside, fill="none", stroke=css(BAD), stroke_width=1.6, class_="box")
 
 
 def _sides(plane: Plane, paper: _Paper) -> str:
@@ -163,11 +156,8 @@ def _sides(plane: Plane, paper: _Paper) -> str:
     ):
         if kind is None or not seen:
             continue
-        turn = " rotate(-90)" if turned else ""
-        parts.append(
-            f'<text transform="translate({at[0]:.1f} {at[1]:.1f}){turn}" text-anchor="middle" '
-            f'fill="{ink(BAD)}">{esc(kind)}</text>'
-        )
+        turn = f"translate({at[0]:.1f} {at[1]:.1f}){' rotate(-90)' if turned else ''}"
+        parts.append(text(0, 0, kind, "middle", transform=turn, fill=ink(BAD)))
     return "".join(parts)
 
 
@@ -186,14 +176,11 @@ def _contours(level: LevelCut, place: int, paper: _Paper, colours: Mapping[str, 
     parts = []
     for ring in (0.5, 1.0, 1.5) if touches else _RINGS:
         own = touches and ring == 1.0
-        parts.append(
-            f'<ellipse rx="{min(paper.scale * ring * long, 9e4):.1f}" ry="{paper.scale * ring * short:.1f}" '
-            f'stroke="{css(colour, 0.95 if own else 0.42)}" stroke-width="{1.8 if own else 1.0}"/>'
-        )
-    return (
-        f'<g fill="none" class="contours-{place + 1}" '
-        f'transform="translate({at}) rotate({-math.degrees(angle):.2f})">{"".join(parts)}</g>'
-    )
+        look = {"stroke": css(colour, 0.95 if own else 0.42), "stroke_width": 1.8 if own else 1.0}
+        rx = min(paper.scale * ring * long, 9e4)
+        parts.append(element("ellipse", rx=rx, ry=paper.scale * ring * short, **look))
+    turn = f"translate({at}) rotate({-math.degrees(angle):.2f})"
+    return element("g", "".join(parts), fill="none", class_=f"contours-{place + 1}", transform=turn)
 
 
 def _left(level: LevelCut, plane: Plane, place: int, paper: _Paper, colours: Mapping[str, RGB]) -> str:
@@ -205,16 +192,14 @@ def _left(level: LevelCut, plane: Plane, place: int, paper: _Paper, colours: Map
     if left.span.shape[1] == 0:
         x, y = paper.x(left.at[0]), paper.y(left.at[1])
         cross = f"M{x - 9:.1f} {y:.1f}h18M{x:.1f} {y - 9:.1f}v18"
-        return f'<path d="{cross}" stroke="{colour}" stroke-width="1.2" class="left-{place + 1}"/>'
+        return path(cross, stroke=colour, stroke_width=1.2, class_=f"left-{place + 1}")
     reach = 3.0 * paper.half + float(np.abs(left.at).max())
     ends = [left.at + s * left.span[:, 0] for s in (-reach, reach)]
     part = left.segment(plane.box)
-    thin = f'<path d="{_line(ends, paper)}" stroke="{colour}" stroke-width="1.4" stroke-dasharray="5 4"/>'
+    thin = path(_line(ends, paper), stroke=colour, stroke_width=1.4, stroke_dasharray="5 4")
     if part is None or not np.isfinite(part).all():
         return thin
-    return (
-        f'{thin}<path d="{_line(part, paper)}" stroke="{colour}" stroke-width="3" class="left-{place + 1}"/>'
-    )
+    return thin + path(_line(part, paper), stroke=colour, stroke_width=3, class_=f"left-{place + 1}")
 
 
 def _line(ends: Sequence[np.ndarray] | np.ndarray, paper: _Paper) -> str:
@@ -230,18 +215,8 @@ def _points(plane: Plane, paper: _Paper, colours: Mapping[str, RGB]) -> list[str
         colour = colours.get(level.name, BOUND)
         if np.abs(level.centre - level.solved).max() > 0.02 * paper.half:
             ring = "M-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0"
-            parts.append(
-                _mark(
-                    f"wish-{place + 1}",
-                    level.centre,
-                    f"{place + 1} alone",
-                    colour,
-                    ring,
-                    paper,
-                    (-8, -5),
-                    True,
-                )
-            )
+            name, words = f"wish-{place + 1}", f"{place + 1} alone"
+            parts.append(_mark(name, level.centre, words, colour, ring, paper, (-8, -5), True))
     if plane.weighted is not None:
         parts.append(
             _mark("weighted", plane.weighted, "weighted", GHOST, "M0 -6L6 0L0 6L-6 0Z", paper, (8, 4))
@@ -276,7 +251,7 @@ def _mark(
         x, y = paper.x(share * w[0]), paper.y(share * w[1])
         angle = -math.degrees(math.atan2(w[1], w[0]))
         words, shape, hollow = f"{words} {_figure(w)}", "M-9 -4L2 0L-9 4Z", False
-        turn = f" rotate({angle:.0f})"
+        turn = f"rotate({angle:.0f})"
         anchor = "end" if x > _LEFT + 0.6 * _SIDE else "start" if x < _LEFT + 0.4 * _SIDE else "middle"
         dx, dy = {"end": -8, "start": 8, "middle": 0}[anchor], 18 if y < _TOP + 0.5 * _SIDE else -12
     else:
@@ -284,13 +259,10 @@ def _mark(
         dx, dy = shift
         if x > _LEFT + 0.85 * _SIDE and dx >= 0:
             anchor, dx = "end", -dx
-    fill = f'fill="none" stroke="{css(colour)}" stroke-width="1.6"' if hollow else f'fill="{css(colour)}"'
-    return (
-        f'<g class="{name}" data-at="{exact}" transform="translate({x:.1f} {y:.1f})">'
-        f'<path d="{shape}" transform="{turn.strip()}" {fill}/>'
-        f'<text x="{dx}" y="{dy}" text-anchor="{anchor}" fill="{ink(colour)}" font-weight="600">'
-        f"{esc(words)}</text></g>"
-    )
+    outline = {"fill": "none", "stroke": css(colour), "stroke_width": 1.6}
+    mark = path(shape, transform=turn, **(outline if hollow else {"fill": css(colour)}))
+    mark += text(dx, dy, words, anchor, fill=ink(colour), font_weight=600)
+    return element("g", mark, class_=name, data_at=exact, transform=f"translate({x:.1f} {y:.1f})")
 
 
 def _figure(w: np.ndarray) -> str:
@@ -300,11 +272,7 @@ def _figure(w: np.ndarray) -> str:
 class PlanePanel:
     """The picture of the plane. It requests its data while the browser shows the picture."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        levels: tuple[str, ...],
-    ) -> None:
+    def __init__(self, page: PageContext, levels: tuple[str, ...]) -> None:
         """levels: names, highest priority first. In a lesson, which has a text of its own, the legend is
         folded."""
         gui, robot = page.gui, page.robot
@@ -358,7 +326,6 @@ class PlanePanel:
         )
 
     def draw(self, moment: Moment) -> None:
-        """Draws the data of an instant."""
         inside = moment.status.inside
         plane = None if inside is None else inside.plane
         if plane is None or not self._picture.in_view:
@@ -372,15 +339,12 @@ class PlanePanel:
         if inside is None or not self._picture.in_view:
             return
         several = settings.horizon > 1 and settings.controller != "hiqp"
-        if self._fewer.visible != several:
-            self._fewer.visible = several
+        self._fewer.visible = several
         drawn = inside.plane is not None
         why_not = "" if drawn else block(esc(inside.why_not))
-        if self._why_not.content != why_not:
-            self._why_not.content, self._folder.visible = why_not, drawn
+        self._why_not.content, self._folder.visible = why_not, drawn
         words = "" if inside.plane is None else self._legend(inside.plane, several)
-        if self._words.content != words:
-            self._words.content = words
+        self._words.content = words
 
     def _legend(self, plane: Plane, several: bool) -> str:
         lines = []

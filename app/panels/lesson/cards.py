@@ -8,7 +8,6 @@ from importlib.resources import files
 
 import viser
 
-from app.client.progress import Notebook
 from app.html.markdown import rendered_line
 from app.html.palette import DAMPING, GOOD, LEVELS, css
 from app.html.palette import button as dark
@@ -16,6 +15,7 @@ from app.html.text import badge, block, esc, formula, readable
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
 from app.panels.widgets.command import on_click
+from app.tab.context import PageContext
 from lessons.course import COURSE, load_lesson
 from lessons.exercises import EXERCISES, exercises_of, load_exercise
 from lessons.exercises.exercise import Exercise
@@ -55,9 +55,10 @@ PATHS: dict[str, tuple[str, ...]] = {
 """Lessons for the time that a learner has."""
 
 
-def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
-    """Adds the paths and the cards to the current container; every button can be reached by the keyboard."""
-    progress = notebook.progress
+def add_cards(page: PageContext, choose: Choose) -> None:
+    """Adds the paths and the cards to the current container; every button can be reached by the keyboard.
+    choose: opens a step or a scene."""
+    gui, progress = page.gui, page.notebook.progress
     gui.add_html(block("<b>How much time do you have?</b> Your progress is stored in this browser."))
     for words, names in PATHS.items():
         name, place = _unfinished(names, progress)
@@ -96,13 +97,14 @@ def _unfinished(names: Sequence[str], progress: LearnerProgress) -> tuple[str, i
     return name, offers[name][1]
 
 
-def add_invitation(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
+def add_invitation(page: PageContext) -> None:
     """Adds a button that leads to the next lesson or step, depending on the learner's progress."""
-    name, place = _unfinished(COURSE, notebook.progress)
+    progress = page.notebook.progress
+    name, place = _unfinished(COURSE, progress)
     lesson, number = load_lesson(name), COURSE.index(name) + 1
-    word, _ = _offer(lesson, notebook.progress)
+    word, _ = _offer(lesson, progress)
     label = f"{word} lesson {number}: {lesson.card.title}"
-    _button(gui, label, SceneChoice.of_lesson(LessonPlace(name, place)), choose, LEVELS[1])
+    _button(page.gui, label, SceneChoice.of_lesson(LessonPlace(name, place)), page.choose, LEVELS[1])
 
 
 def _button(
@@ -167,7 +169,6 @@ def glyph(name: str) -> str:
 
 
 def exercise_cards() -> str:
-    """Returns the cards of all exercises, in order."""
     said = (
         f"<b>{len(EXERCISES)} exercises</b>: write the missing lines of a controller in a file of your own. "
         "This page runs the file whenever you save it. The last command judges the robot's motion."
@@ -182,7 +183,6 @@ def belonging_to(lesson: str) -> str:
 
 
 def card(exercise: Exercise) -> str:
-    """Returns the card of one exercise."""
     lesson = load_lesson(exercise.lesson).card.title
     lines = "<br>".join(f"<code>{esc(each)}</code>" for each in exercise.commands())
     return block(

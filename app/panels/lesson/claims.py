@@ -5,24 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from app.html.glossary import STYLE
-from app.html.markdown import rendered, rendered_line, split, word_count
+from app.html.markdown import STYLE, rendered, rendered_line, split, word_count
 from app.html.palette import BAD, BOUND, GHOST, GOOD, LEVELS, RGB, css, ink, on
 from app.html.text import badge, bar, block, esc, figure, joints_named
 from app.link.exercise import Lecture, LessonPlace, parts_of, signals_of
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart
 from lessons.course import COURSE
-from lessons.events import (
-    Appear,
-    InsertTask,
-    MoveLevel,
-    MoveTarget,
-    Push,
-    Release,
-    RemoveTask,
-    Reset,
-    Set,
-)
+from lessons.events import Appear, InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
 from lessons.teaching.lesson import Challenge, Claim, Script, Step
 from lessons.teaching.measure import Signal
 from lessons.teaching.prediction import Choice
@@ -107,7 +96,6 @@ def state(part: Part, lecture: Lecture, best: float | None) -> str:
 
 
 def why(part: Part) -> str:
-    """Returns the explanation of the result."""
     if isinstance(part, Challenge):
         return ""
     first, rest = split(part.why, min(_WHY, _AFTER - _result_words(part)))
@@ -117,7 +105,6 @@ def why(part: Part) -> str:
 
 
 def now_you(part: Part, lecture: Lecture) -> str:
-    """Returns what the learner can do now."""
     if isinstance(part, Challenge):
         return ""
     return block(f"<b>Now you:</b> {rendered_line(part.do)}")

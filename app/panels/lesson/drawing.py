@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from app.html.curves import decades, path_through, tick_label, ticks
 from app.html.palette import BOUND, DARK_PAGE, GOOD, LEVELS, LIGHT_PAGE, RGB, css, ink
+from app.html.svg import decades, element, path, path_through, picture, text, tick_label, ticks
 from app.html.text import esc, figure
 from app.link.exercise import SignalCurve
 
@@ -29,16 +29,14 @@ def scale(low: float, high: float, guess: float | None, truth: float | None, fac
         share = math.log(max(value, 1e-300) / low) / math.log(high / low)
         return 14 + (_W - 28) * min(max(share, -0.02), 1.02)
 
-    parts = [f'<line x1="14" x2="{_W - 14}" y1="34" y2="34" stroke="currentColor" stroke-width="1.5"/>']
+    parts = [path(f"M14 34H{_W - 14}", stroke="currentColor", stroke_width=1.5)]
     for power in range(math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9) + 1):
         at = x(10.0**power)
-        parts.append(f'<line x1="{at:.1f}" x2="{at:.1f}" y1="30" y2="38" stroke="currentColor"/>')
+        parts.append(path(f"M{at:.1f} 30V38", stroke="currentColor"))
         parts.append(_text(at, 51, figure(10.0**power), anchor="middle"))
     if truth is not None and math.isfinite(truth) and truth > 0:
         left, right = x(truth / factor), x(truth * factor)
-        parts.append(
-            f'<rect x="{left:.1f}" width="{right - left:.1f}" y="26" height="16" fill="{css(GOOD, 0.25)}"/>'
-        )
+        parts.append(element("rect", x=left, width=right - left, y=26, height=16, fill=css(GOOD, 0.25)))
         parts.append(_pointer(x(truth), 34, 60, TRUTH))
         parts.append(_text(x(truth), 72, f"measured {figure(truth, unit)}", TRUTH, "middle", bold=True))
     if guess is not None:
@@ -108,10 +106,9 @@ def chart(
     parts += frame.marks(marks)
     for bound in bounds:
         y, left, right = frame.y(bound.value), frame.x(bound.after), frame.x(min(bound.until, until))
-        parts.append(
-            f'<line x1="{left:.1f}" x2="{right:.1f}" y1="{y:.1f}" y2="{y:.1f}" stroke="{css(GOOD)}" '
-            f'stroke-width="1.5" stroke-dasharray="2 3"><title>{esc(bound.words)}</title></line>'
-        )
+        look = {"stroke": css(GOOD), "stroke_width": 1.5, "stroke_dasharray": "2 3"}
+        line = f"M{left:.1f} {y:.1f}H{right:.1f}"
+        parts.append(element("path", element("title", esc(bound.words)), d=line, **look))
     parts += [frame.line(line.curve, line.colour, line.dashes) for line in reversed(lines)]
     named = [(frame.y(bound.value) - 4, bound.label, GOOD) for bound in bounds]
     named += [(frame.end(line.curve) - 5, line.name, line.colour) for line in lines if line.name]
@@ -135,10 +132,7 @@ def sketch(
         _text(0, 11, f"[{unit}]" if unit else "", bold=True),
         _text(frame.left, 11, "your sketch", GUESS, bold=True),
         frame.line(SignalCurve(times, values), GUESS, "6 3"),
-        *(
-            f'<circle cx="{frame.x(t):.1f}" cy="{frame.y(v):.1f}" r="3.5" fill="{css(GUESS)}"/>'
-            for t, v in points
-        ),
+        *(element("circle", cx=frame.x(t), cy=frame.y(v), r=3.5, fill=css(GUESS)) for t, v in points),
     ]
     if truth is not None:
         inside = truth.t <= until
@@ -182,8 +176,8 @@ class _Frame(NamedTuple):
         grid = "".join(f"M{self.left} {self.y(level):.1f}H{_W - 6}" for level in levels)
         grid += "".join(f"M{self.x(t):.1f} {self.top}V{self._floor}" for t in seconds)
         parts = [
-            f'<path d="{grid}" stroke="{css(BOUND, 0.25)}"/>',
-            f'<path d="M{self.left} {self.top}V{self._floor}H{_W - 6}" stroke="{css(BOUND)}" fill="none"/>',
+            path(grid, stroke=css(BOUND, 0.25)),
+            path(f"M{self.left} {self.top}V{self._floor}H{_W - 6}", stroke=css(BOUND), fill="none"),
         ]
         for level in levels:
             parts.append(_text(self.left - 4, self.y(level) + 4, tick_label(level, log), anchor="end"))
@@ -198,10 +192,8 @@ class _Frame(NamedTuple):
         parts, free = [], -math.inf
         for t, words in marks:
             x = self.x(t)
-            parts.append(
-                f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{self.top}" y2="{self._floor}" stroke="{css(BOUND)}" '
-                f'stroke-dasharray="4 3"/>'
-            )
+            line = f"M{x:.1f} {self.top}V{self._floor}"
+            parts.append(path(line, stroke=css(BOUND), stroke_dasharray="4 3"))
             width = _WIDE * (len(words) + 2)
             left = min(x - 4, _W - 4 - width)
             if words and left > free:
@@ -239,13 +231,11 @@ class _Frame(NamedTuple):
             words = f"{t:.2f} s: {values}"
             half = 0.5 * _WIDE * len(words)
             left = min(max(x - half, self.left), _W - 6 - 2 * half)
-            area = f'y="{self.top}" width="{wide:.1f}" height="{self._floor - self.top}"'
-            middle = f"M{x + wide / 2:.1f} {self.top}V{self._floor}"
-            parts.append(
-                f'<g class="hl-at"><rect x="{x:.1f}" {area} fill="transparent"/><g>'
-                f'<path d="{middle}" stroke="currentColor"/>'
-                f"{_text(left, self.top + 11, words, bold=True, halo=True)}</g></g>"
-            )
+            size: dict[str, Any] = {"width": wide, "height": self._floor - self.top}
+            strip = element("rect", x=x, y=self.top, **size, fill="transparent")
+            reading = path(f"M{x + wide / 2:.1f} {self.top}V{self._floor}", stroke="currentColor")
+            reading += _text(left, self.top + 11, words, bold=True, halo=True)
+            parts.append(element("g", strip + element("g", reading), class_="hl-at"))
         return parts
 
     def line(self, curve: SignalCurve, colour: RGB, dashes: str = "none") -> str:
@@ -254,10 +244,8 @@ class _Frame(NamedTuple):
             (self.x(t), self.y(value)) if math.isfinite(value) else None
             for t, value in zip(curve.t.tolist(), curve.values.tolist(), strict=True)
         )
-        return (
-            f'<path d="{points}" stroke="{css(colour)}" stroke-width="2" fill="none" '
-            f'stroke-linejoin="round" stroke-dasharray="{dashes}"/>'
-        )
+        look = {"stroke_width": 2, "fill": "none", "stroke_linejoin": "round", "stroke_dasharray": dashes}
+        return path(points, stroke=css(colour), **look)
 
 
 def _axis(values: np.ndarray, marks: list[float]) -> Axis:
@@ -278,10 +266,8 @@ def _axis(values: np.ndarray, marks: list[float]) -> Axis:
 
 def _pointer(x: float, tip: float, foot: float, colour: RGB) -> str:
     d = 5 if foot > tip else -5
-    return (
-        f'<path d="M{x:.1f} {tip}L{x - 5:.1f} {tip + 2 * d}H{x + 5:.1f}Z" fill="{css(colour)}"/>'
-        f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{tip}" y2="{foot}" stroke="{css(colour)}" stroke-width="2"/>'
-    )
+    head = path(f"M{x:.1f} {tip}L{x - 5:.1f} {tip + 2 * d}H{x + 5:.1f}Z", fill=css(colour))
+    return head + path(f"M{x:.1f} {tip}V{foot}", stroke=css(colour), stroke_width=2)
 
 
 def _text(
@@ -296,16 +282,10 @@ def _text(
     """halo: whether the words have a rim in the colour of the page, so that they can be read on a curve."""
     half = 0.5 * _WIDE * len(words)  # a centred label near an edge would be cut off
     x = min(max(x, half + 2), _W - half - 2) if anchor == "middle" else x
-    weight = ' font-weight="600"' if bold else ""
+    rim = {"stroke": _PAGE, "stroke_width": 3, "paint_order": "stroke"} if halo else {}
     fill = "currentColor" if colour is None else ink(colour)
-    rim = f' stroke="{_PAGE}" stroke-width="3" paint-order="stroke"' if halo else ""
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" fill="{fill}" text-anchor="{anchor}"{weight}{rim}>{esc(words)}</text>'
-    )
+    return text(x, y, words, anchor, fill=fill, font_weight=600 if bold else None, **rim)
 
 
 def _svg(height: float, parts: Sequence[str], words: str) -> str:
-    return (
-        f'<svg viewBox="0 0 {_W} {height}" width="100%" role="img" aria-label="{esc(words)}" '
-        f'style="display:block" font-size="11" font-family="inherit">{"".join(parts)}</svg>'
-    )
+    return picture(_W, height, words, "".join(parts))

@@ -115,10 +115,10 @@ class Asking:
             self._recall(lecture.answer)
         before = lecture.phase in ("waiting", "preparing") and lecture.grade is None
         for each in self._inputs:
-            _put(each, "visible", before)
+            each.visible = before
         for k, each in enumerate(self._options):
-            _put(each, "disabled", not before)
-            _put(each, "visible", lecture.grade is None or k in self._compared(lecture))
+            each.disabled = not before
+            each.visible = lecture.grade is None or k in self._compared(lecture)
         self._write(lecture)
 
     def _compared(self, lecture: Lecture) -> tuple[object, ...]:
@@ -140,17 +140,17 @@ class Asking:
         known = lecture if lecture is not None and lecture.grade is not None else None
         html = f"<b>{'Predict' if known is None else 'You predicted'}:</b> "
         html += rendered_line(self._prediction.question) + self._pictured(known)
-        _put(self._picture, "content", _ruled(html))
+        self._picture.content = _ruled(html)
         choice = self._prediction if isinstance(self._prediction, Choice) else None
         told = choice is not None and known is not None and choice.right(known.truth) is not None
-        _put(self._verdict, "visible", known is not None and not told)  # the buttons tell it
+        self._verdict.visible = known is not None and not told  # the buttons tell it
         if known is not None and known.grade is not None and not told:
             score = known.grade.score
             word, colour = (
                 ("RIGHT", GOOD) if score >= 0.999 else ("NEARLY", LEVELS[1]) if score > 0 else ("NOT SO", BAD)
             )
             words = f"{badge(word, colour)} {rendered_line(readable(known.grade.words))}"
-            _put(self._verdict, "content", _ruled(words))
+            self._verdict.content = _ruled(words)
 
     def _pictured(self, lecture: Lecture | None) -> str:
         """Returns the picture of the prediction. The options of a choice, which are buttons, are updated
@@ -178,17 +178,16 @@ class Asking:
         right = choice.right(truth)
         rules = _OPTIONS.format(", ".join(f'[id="{dom_id(each)}"]' for each in self._options))
         for k, option in enumerate(self._options):
-            _put(option, "label", _label(choice, k, mine, truth))
+            option.label = _label(choice, k, mine, truth)
             if k in (mine, right):
                 filled = css(button(GOOD if k == right else BAD)) if right is not None else css(_CHOSEN, 0.18)
                 rules += _COLOURED.format(
                     dom_id(option), filled, "#fff" if right is not None else "inherit", css(_CHOSEN)
                 )
-        _put(self._style, "content", f"<style>{rules}</style>")
+        self._style.content = f"<style>{rules}</style>"
 
 
 def _label(choice: Choice, place: int, mine: Answer | None, truth: float) -> str:
-    """Returns the words on the button of an option."""
     right = choice.right(truth)
     marks = [] if right is None or place not in (mine, right) else ["✓" if place == right else "✗"]
     marks += ["your answer"] if place == mine else []
@@ -210,9 +209,3 @@ _COLOURED = '[id="{0}"],[id="{0}"]:hover{{background:{1}!important;color:{2}!imp
 
 def _ruled(html: str) -> str:
     return block(html, f"border-left:3px solid {css(LEVELS[0])};margin:0.3em 0")
-
-
-def _put(handle: Any, name: str, value: object) -> None:
-    """Sets an attribute of a control if it differs: viser would send it again."""
-    if getattr(handle, name) != value:
-        setattr(handle, name, value)

@@ -1,4 +1,5 @@
-"""The lesson's tab: one step at a time, with its idea, its prediction, its run and the results."""
+"""The lessons in the first tab: one step at a time, with its idea, its prediction, its run and the results;
+and the list of lessons."""
 
 from __future__ import annotations
 
@@ -7,18 +8,18 @@ from dataclasses import replace
 
 import viser
 
-from app.client.progress import Notebook
 from app.html.palette import LEVELS, button
+from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, parts_of
 from app.link.messages import Predict, ResetAll, RunStep
 from app.link.threads import on_thread
-from app.panels.context import PageContext
-from app.panels.lesson.cards import belonging_to
+from app.panels.lesson.cards import add_cards, add_invitation, belonging_to, exercise_cards
 from app.panels.lesson.claims import heading, idea, now_you, pictures, state, why
 from app.panels.lesson.prediction import Asking
-from app.panels.widgets.command import add_command, on_click
+from app.panels.widgets.command import PopupWindow, add_command, on_click
 from app.panels.widgets.controls import add_control
-from app.panels.widgets.mirror import Bindings
+from app.tab.context import PageContext
+from app.tab.mirror import Bindings
 from lessons.settings.settings import SceneSettings
 from lessons.teaching.lesson import Challenge, Step
 
@@ -36,12 +37,11 @@ class LessonPanel:
         pictures: viser.GuiHtmlHandle | None,
         exercise: LessonPlace,
         all_lessons: Callable[[], None],
-        notebook: Notebook,
     ) -> None:
         """pictures: where the curves of the run are drawn. If it is None, as on a phone, they are drawn here
         below the answers, and the idea follows."""
         self._page, self._tab, self._far = page, tab, pictures
-        self._all_lessons, self._notebook = all_lessons, notebook
+        self._all_lessons = all_lessons
         self._fast, self._beside = False, page.learner.shows_ghosts
         self._turn_to(exercise)
         for label, key, does in (
@@ -59,7 +59,6 @@ class LessonPanel:
         self._arrived = True
         last = exercise.place + 1 >= len(parts_of(exercise.whole))
         self._exercises = belonging_to(exercise.lesson) if last else ""
-        self._shown: dict[str, str] = {}
         self._bindings: Bindings[SceneSettings] = Bindings(self._page.post, self._page.loop)
         with self._tab:
             self._all = self._page.gui.add_folder(None)
@@ -163,7 +162,6 @@ class LessonPanel:
         self._page.send(Predict(answer))  # pyright: ignore[reportArgumentType]
 
     def run(self) -> None:
-        """Runs the step's script from its start."""
         lecture, asking = self._lecture, self._asking
         if asking is not None and lecture is not None and lecture.answer is None:
             suggested = asking.suggested
@@ -189,7 +187,6 @@ class LessonPanel:
     # ---------------------------------------------------------------- showing
 
     def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
-        """Updates the progress of the exercise."""
         if lecture is None:
             return
         if lecture.exercise != self._exercise:
@@ -208,7 +205,7 @@ class LessonPanel:
     def _note(self, lecture: Lecture) -> None:
         if lecture.phase != "done":
             return
-        name, notebook = self._exercise.lesson, self._notebook
+        name, notebook = self._exercise.lesson, self._page.notebook
         progress = notebook.progress
         if isinstance(self._part, Step):
             progress = progress.with_step(name, self._exercise.place)
@@ -226,32 +223,65 @@ class LessonPanel:
             self._asking.show(lecture)
         ready = self._asking is None or lecture.answer is not None or self._asking.suggested is not None
         label = "Start the run" if challenge else "Run this step" if ready else "Run (answer first)"
-        if self._run.label != label:
-            self._run.label = label
+        self._run.label = label
         for handle, shown in (
             (self._run, challenge or lecture.phase == "waiting"),
             (self._hurry, challenge or lecture.phase == "waiting"),
             (self._next, over and (passed or not challenge)),
             (self._free, over and not challenge),
         ):
-            if handle.visible != shown:
-                handle.visible = shown
+            handle.visible = shown
         busy = lecture.phase in ("preparing", "running")
-        if self._run.disabled != (busy or not ready):
-            self._run.disabled = busy or not ready
-        best = self._notebook.progress.best.get(self._exercise.lesson)
-        self._put("idea", self._idea, idea(self._part, opened=not seen))
-        self._put("state", self._state, state(self._part, lecture, best))
+        self._run.disabled = busy or not ready
+        best = self._page.notebook.progress.best.get(self._exercise.lesson)
+        self._idea.content = idea(self._part, opened=not seen)
+        self._state.content = state(self._part, lecture, best)
         if self._far is not None or lecture.curves:
-            self._put("pictures", self._pictures, pictures(self._part, lecture))
-        self._put("why", self._why, why(self._part) if over else "")
-        self._put("now you", self._now_you, now_you(self._part, lecture) + self._exercises if over else "")
-
-    def _put(self, name: str, handle: viser.GuiHtmlHandle, html: str) -> None:
-        if self._shown.get(name) != html:
-            self._shown[name] = html
-            handle.content = html
+            self._pictures.content = pictures(self._part, lecture)
+        self._why.content = why(self._part) if over else ""
+        self._now_you.content = now_you(self._part, lecture) + self._exercises if over else ""
 
     def close(self) -> None:
         """Stops all updates before the controls are removed."""
         self._bindings.close()
+
+
+class Course:
+    """The lessons of a page, built anew for every scene. In a lesson the first tab has its step, otherwise a
+    button that leads to the next lesson."""
+
+    def __init__(self, page: PageContext, plots: viser.PanelHandle | viser.GuiTabGroupHandle | None) -> None:
+        """plots: gets a tab with the curves of the step. If it
+        is None, the curves are in the panel of the step."""
+        gui, exercise = page.gui, page.learner.choice_of(page.ready).exercise
+        self._page = page
+        self._list = PopupWindow(gui, "All lessons", "L", self._fill)
+        self._panel: LessonPanel | None = None
+        if exercise is None:
+            add_invitation(page)
+            on_click(gui.add_button("All lessons", hint="Key L"), self._list.open)
+            return
+        pictures = None
+        if plots is not None:
+            with plots.add_tab("This step"):
+                pictures = gui.add_html("")
+        tab = gui.add_folder(None)
+        self._panel = LessonPanel(page, tab, pictures, exercise, self._list.open)
+
+    def _fill(self) -> None:
+        add_cards(self._page, self._leave_for)
+        self._page.gui.add_html(exercise_cards())
+
+    def _leave_for(self, choice: SceneChoice) -> None:
+        self._list.close()
+        self._page.choose(choice)
+
+    def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
+        if self._panel is not None:
+            self._panel.follow(lecture, settings)
+
+    def close(self) -> None:
+        """Closes the list and the panel before the page removes them."""
+        self._list.close()
+        if self._panel is not None:
+            self._panel.close()

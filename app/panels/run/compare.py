@@ -7,12 +7,11 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.run_statistics import RunFigures
+from app.client.recording import RunFigures
 from app.html.palette import BAD, BOUND, GHOST, button, ink
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
-from app.panels.context import PageContext
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from lessons.session.ghost import swapped
 from lessons.settings.listing import usual_settings
 from lessons.settings.settings import SceneSettings
@@ -28,10 +27,7 @@ class ComparePanel:
     """The panel of the ghost. Callbacks only start and end ghosts; the state is read from the
     learner's simulation, so that a ghost that a lesson started is also shown."""
 
-    def __init__(
-        self,
-        page: PageContext,
-    ) -> None:
+    def __init__(self, page: PageContext) -> None:
         gui, learner, settings = page.gui, page.learner, page.settings
         self._learner, self._colours = learner, page.colours
         self._choices = {each.shown.name: each for each in usual_settings(settings)}
@@ -117,13 +113,11 @@ class ComparePanel:
         """Shows the state of the ghost, and the results of both runs."""
         ghost = self._learner.ghost
         on = ghost is not None
-        if self._end.visible != on:
-            self._end.visible = self._swap.visible = self._table.visible = on
-            self._start.label = "Start again with these" if on else "Start the ghost"
+        self._end.visible = self._swap.visible = self._table.visible = on
+        self._start.label = "Start again with these" if on else "Start the ghost"
         if ghost is None:
             return
-        mine = None if self._learner.score is None else self._learner.score.result()
-        its = None if ghost.score is None else ghost.score.result()
+        mine, its = self._learner.figures, ghost.figures
         if its is None or mine is None or ghost.status is None:
             self._table.content = block(f"{badge('GHOST', GHOST)} is starting …")
             return

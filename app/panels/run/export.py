@@ -1,20 +1,28 @@
-"""Downloads: telemetry rows, plots, and the setting."""
+"""The tab Export: downloads of rows and plots; the setting as a command line, a state code and a script; and
+the learner's progress, to hand in."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 
 import numpy as np
 import viser
 
-from app.client.rows import RATE
+from app.client.recording import RATE
 from app.client.simulation import Simulation
 from app.html.text import block
-from app.panels.context import PageContext
+from app.link.choice import SceneChoice
+from app.link.messages import RunDescription
+from app.tab.context import PageContext
 from lessons.plots.recorded import Recorded, run_picture
 from lessons.recording.arrays import as_csv, as_npz, named
+from lessons.replay.progress import LONGEST_NAME
+from lessons.replay.script import script
+from lessons.replay.state import State, decode, encode, state_of
+from robots import InputError
 
 _MINUTE, _WHOLE = "the last minute", "all since the last reset"
 
@@ -25,7 +33,7 @@ class ExportPanel:
 
     def __init__(self, page: PageContext) -> None:
         gui, self._page, self._learner = page.gui, page, page.learner
-        gui.add_html(_INTRO)
+        gui.add_html(_DOWNLOAD)
         self._span = gui.add_dropdown("Of", (_MINUTE, _WHOLE), initial_value=_MINUTE)
         for label, make, hint in (
             ("Rows as .npz", self._npz, "NumPy arrays with the same names as from himpc-lab run --npz"),
@@ -98,8 +106,124 @@ class ExportPanel:
             return name, draw(picture, Path(folder)).read_bytes()
 
 
-_INTRO = block(
+_DOWNLOAD = block(
     f"<b>Download the run.</b> The page stores up to {RATE:g} rows per second, each exactly as the "
     "simulation wrote it. Of a long run, the page stores every second, fourth, … of these rows.",
     "padding-top:0.5em",
 )
+
+
+def add_hand_in(page: PageContext) -> None:
+    """Adds the folder with which learners hand in their progress. The text to hand in is written when the
+    learner asks for it, on one of viser's threads."""
+    gui, learner, notebook = page.gui, page.learner, page.notebook
+    with gui.add_folder("Hand in your progress", expand_by_default=False):
+        told = f" The text names your account, <b>{escape(notebook.account)}</b>." if notebook.account else ""
+        gui.add_html(block((_SIGNED if notebook.signs else _NOT_SIGNED) + told))
+        name = gui.add_text("Your name", notebook.account[:LONGEST_NAME])
+        make = gui.add_button("Write the text")
+        text = gui.add_text("To hand in", "", multiline=True, visible=False)
+
+    @make.on_click
+    def _(_: object) -> None:
+        text.visible = False
+        # An uploaded robot has no code; the text still contains the progress.
+        text.value = notebook.to_hand_in(str(name.value).strip()[:LONGEST_NAME], learner.code)
+        text.visible = True
+
+
+_WHAT = (
+    "The text lists the lessons whose steps you ran, the best scores of their challenges, and the code of "
+    "the present setting. Copy the text and send it; <code>himpc-lab grade FILE.txt</code> reads it."
+)
+_SIGNED = f"{_WHAT} This lab signs the text with its instructor's key."
+_NOT_SIGNED = f"{_WHAT} This lab has no instructor's key, so anybody could have written the text."
+
+
+class SharePanel:
+    """The panel of texts, which are made on request, on viser's threads."""
+
+    def __init__(self, page: PageContext) -> None:
+        gui, self._learner = page.gui, page.learner
+        with gui.add_folder("Share the setting"):
+            gui.add_html(_SHARE)
+            make = gui.add_button("Write it down")
+            self._line = gui.add_text("Command line", "", multiline=True, visible=False)
+            self._code = gui.add_text("Code", "", multiline=True, visible=False)
+            save = gui.add_button(
+                "Script as .py", hint="Repeats the run since the last reset with its events, to the last bit"
+            )
+            given = gui.add_text("Somebody's code", "", hint="Same as himpc-lab --state CODE")
+            take = gui.add_button("Open it")
+
+        @make.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            self._try(event.client, self._write)
+
+        @save.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            client = event.client
+            if client is not None:
+                self._try(client, lambda told: self._save(client, told))
+
+        @take.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # on a worker: a scene is loaded twice
+            try:
+                page.choose(SceneChoice.of_state(decode(str(given.value))))
+            except InputError as error:
+                _refuse(event.client, error)
+
+    def _try(self, client: viser.ClientHandle | None, make: Callable[[RunDescription], None]) -> None:
+        told = self._learner.ask()
+        try:
+            if told is None:
+                raise InputError("the simulation does not answer: press Reset all, then try again")
+            make(told)
+        except InputError as error:
+            _refuse(client, error)
+
+    def _write(self, told: RunDescription) -> None:
+        state = state_now(told)
+        self._line.value = state.run.command_line()
+        self._line.visible = True
+        self._code.visible = False
+        self._code.value = encode(state)
+        self._code.visible = True
+
+    def _save(self, client: viser.ClientHandle, told: RunDescription) -> None:
+        choice = refuse_uploaded_robot(told.choice)
+        text = script(choice.run, told.log, told.t)
+        client.send_file_download(f"{choice.run.scene}.py", text.encode(), save_immediately=True)
+
+
+def _refuse(client: viser.ClientHandle | None, error: InputError) -> None:
+    if client is not None:
+        client.add_notification("That does not work", str(error), color="orange", auto_close_seconds=10.0)
+
+
+_SHARE = block(
+    "Scene, robot, controller and every changed setting, as a command line for a terminal and as a code for "
+    "another page. The script also repeats the events since the last reset."
+)
+
+
+def state_now(told: RunDescription) -> State:
+    """Returns the state of the setting on a page. Raises InputError for a robot that was uploaded."""
+    choice = refuse_uploaded_robot(told.choice)
+    exercise = choice.exercise
+    return state_of(
+        choice.run,
+        told.settings,
+        lesson=None if exercise is None else exercise.lesson,
+        step=None if exercise is None else exercise.place + 1,
+    )
+
+
+def refuse_uploaded_robot(choice: SceneChoice) -> SceneChoice:
+    """Returns the choice unchanged. Raises InputError if its robot was uploaded."""
+    if choice.urdf_text is not None:
+        raise InputError(
+            "a code cannot contain this robot, which was uploaded: save its file and "
+            "start himpc-lab with --urdf"
+        )
+    return choice

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import viser
 
-from app.html.glossary import words
+from app.html.markdown import words
 from app.html.text import block
-from app.panels.widgets.window import PopupWindow
+from app.panels.widgets.command import PopupWindow
 
 _KEYS = (
     ("Space", "run or pause"),
@@ -37,10 +37,7 @@ _MARKS = (
         "fallback",
         "the fallback that was applied when a QP had no valid solution; all values except 'solved' are red",
     ),
-    (
-        "δ",
-        "HTMPC: the amount by which lower levels may enlarge a higher level's error, up to |e*| + δ",
-    ),
+    ("δ", "HTMPC: the amount by which lower levels may enlarge a higher level's error, up to |e*| + δ"),
     ("window", "HTMPC: the mission's tasks that the controller performs now, highest priority first"),
     ("slower than real time", "this computer cannot keep up; no tick is skipped"),
 )

@@ -3,21 +3,27 @@ shares of their bounds, or one joint in its units."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from app.client.decimated import PlotWindow
+from app.client.recording import PlotWindow
 from app.html.palette import BAD, BOUND, GOOD, ink, joint_colour, joint_dash
 from app.html.text import block, joints_named
-from app.panels.context import PageContext
-from app.panels.widgets.chart import Chart, ChartLine, of_ghost
+from app.panels.widgets.chart import ChartLine, Charts, Plot
+from app.tab.context import PageContext
 from robots import Robot
 from robots.joints import joint_axis
 
 _ALL = "All joints, % of bound"
 _SHARE = 120.0  # %: the axis reaches slightly beyond the bounds
+_HEIGHT = 170  # px
+_BOUNDS = (
+    ChartLine("upper bound", BOUND, dashed=True),
+    ChartLine("lower bound", BOUND, dashed=True),
+    ChartLine("at bound", BAD, fill=0.5, width=0.5),
+)
 _RUG = 0.035  # height of the mark "at its bound", as a share of the axis
 
 
@@ -26,7 +32,6 @@ class _Quantity:
     """values, lower, upper: (rows, n), NaN where unknown. Where a bound is off, lower and upper contain the
     bound of the data sheet."""
 
-    title: str
     values: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
@@ -60,58 +65,86 @@ class JointPlots:
 
     def __init__(self, page: PageContext, driven: Input = TORQUE) -> None:
         gui, robot = page.gui, page.robot
-        self._gui, self._in_view = gui, page.in_view
         self._robot, self._input = robot, driven
         self._sheet = data_sheet(robot, driven)
         self._prismatic = [joint_axis(robot.model, joint)[0] for joint in robot.joints]
-        self._joint: int | None = None
-        self._built: tuple[int | None, bool] | None = None
-        self._charts: list[Chart] = []
         options = (_ALL, *map(joints_named, robot.joint_names))
         choice = gui.add_dropdown("Joints", options, initial_value=_ALL)
-        self._place = gui.add_folder(None)
+        self._charts = Charts(page)
         gui.add_html(
             block(
                 "The range within the bounds is shaded. If a bound is off, the data sheet's bound is used. "
                 f'A <b style="color:{ink(BAD)}">red mark</b> at the bottom: a shown joint is at its bound.'
             )
         )
-
-        @choice.on_update
-        async def _(_: object) -> None:
-            index = options.index(str(choice.value)) - 1
-            self._joint = None if index < 0 else index
+        self._chosen: Callable[[], int] = lambda: options.index(str(choice.value)) - 1
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None) -> None:
         """ghost: the ghost's data over the same interval, drawn dashed."""
-        joint = self._joint
-        if (joint, ghost is not None) != self._built:
-            self._build(joint, ghost is not None)
-        if not any(chart.in_view for chart in self._charts):
-            return
-        beside = [None] * 3 if ghost is None else quantities(ghost, self._input, self._sheet)
-        own = quantities(window, self._input, self._sheet)
-        for kind, (chart, *found) in enumerate(zip(self._charts, own, beside, strict=True)):
-            chart.show(window, partial(self._curves, window.at_bound(kind), kind, joint, *found))
+        joint = self._chosen()
+        kinds = range(3)
+        plots = [
+            self._all(kind, ghost is not None) if joint < 0 else self._one(kind, joint) for kind in kinds
+        ]
+        self._charts.draw(plots, window, ghost)
 
-    def _curves(
-        self, at_bound: np.ndarray, kind: int, joint: int | None, own: _Quantity, other: _Quantity | None
-    ) -> list[np.ndarray]:
-        """Returns the curves of a chart: values, upper and lower bound, marks at the bottom, and the ghost's
-        values."""
-        if joint is None:
-            edge = np.where(np.isfinite(own.values[:, 0]), 100.0, np.nan)
-            low, high = -_SHARE, _SHARE
-            lines = [*own.shares().T, edge, -edge]
-            dashed = [] if other is None else list(other.shares().T)
-            marked = at_bound.any(axis=1)
-        else:
-            low, high = self._span(kind, joint)
-            unit = self._unit(kind, joint)[1]
-            lines = [unit * each[:, joint] for each in (own.values, own.upper, own.lower)]
-            dashed = [] if other is None else [unit * other.values[:, joint]]
-            marked = at_bound[:, joint]
-        return [*lines, np.where(marked, low + _RUG * (high - low), low), *dashed]
+    def _all(self, kind: int, ghost: bool) -> Plot:
+        """Returns the chart of all joints. One legend is enough for the three charts. With a ghost there is
+        no legend, as a legend would name each joint twice."""
+        names = self._robot.joint_names
+
+        def shares(window: PlotWindow) -> list[np.ndarray]:
+            return list(quantity(window, self._input, self._sheet, kind).shares().T)
+
+        def marked(window: PlotWindow) -> list[np.ndarray]:
+            known = np.isfinite(quantity(window, self._input, self._sheet, kind).values[:, 0])
+            edge = np.where(known, 100.0, np.nan)
+            return [edge, -edge, _rug(window.at_bound(kind).any(axis=1), -_SHARE, _SHARE)]
+
+        return Plot(
+            f"{self._titles[kind]}, % of bound",
+            (-_SHARE, _SHARE),
+            tuple(
+                ChartLine(_short(name, k), joint_colour(k), dash=joint_dash(k))
+                for k, name in enumerate(names)
+            ),
+            shares,
+            _BOUNDS,
+            marked,
+            log=False,
+            bands=((len(names), len(names) + 1, GOOD),),
+            height=_HEIGHT,
+            legend=kind == 2 and not ghost,
+        )
+
+    def _one(self, kind: int, joint: int) -> Plot:
+        unit, factor = self._unit(kind, joint)
+        span = self._span(kind, joint)
+
+        def values(window: PlotWindow) -> list[np.ndarray]:
+            return [factor * quantity(window, self._input, self._sheet, kind).values[:, joint]]
+
+        def marked(window: PlotWindow) -> list[np.ndarray]:
+            own = quantity(window, self._input, self._sheet, kind)
+            bounds = [factor * each[:, joint] for each in (own.upper, own.lower)]
+            return [*bounds, _rug(window.at_bound(kind)[:, joint], *span)]
+
+        return Plot(
+            f"{self._titles[kind]}, {unit}",
+            span,
+            (ChartLine(joints_named(self._robot.joint_names[joint]), joint_colour(joint), width=2.0),),
+            values,
+            _BOUNDS,
+            marked,
+            log=False,
+            bands=((1, 2, GOOD),),
+            height=_HEIGHT,
+            legend=kind == 2,
+        )
+
+    @property
+    def _titles(self) -> tuple[str, str, str]:
+        return self._input.title, "Velocity", "Position"
 
     def _unit(self, kind: int, joint: int) -> tuple[str, float]:
         """Returns the unit on the axis and the factor from the SI unit."""
@@ -126,77 +159,28 @@ class JointPlots:
         margin = 0.1 * (upper - lower)
         return lower - margin, upper + margin
 
-    def _build(self, joint: int | None, ghost: bool) -> None:
-        for chart in self._charts:
-            chart.remove()
-        names = self._robot.joint_names
-        with self._place:
-            self._charts = [
-                self._all(title, names, kind == 2, ghost)
-                if joint is None
-                else self._one(title, kind, joint, ghost)
-                for kind, title in enumerate((self._input.title, "Velocity", "Position"))
-            ]
-        self._built = joint, ghost
 
-    def _all(self, title: str, names: tuple[str, ...], last: bool, ghost: bool) -> Chart:
-        n = len(names)
-        lines = [
-            ChartLine(_short(name, k), joint_colour(k), dash=joint_dash(k)) for k, name in enumerate(names)
-        ]
-        bounds = [ChartLine("upper bound", BOUND, dashed=True), ChartLine("lower bound", BOUND, dashed=True)]
-        return Chart(
-            self._gui,
-            self._in_view,
-            f"{title}, % of bound",
-            [*lines, *bounds, ChartLine("at bound", BAD, fill=0.5, width=0.5), *of_ghost(lines, ghost)],
-            (-_SHARE, _SHARE),
-            height=170,
-            bands=((n, n + 1, GOOD),),
-            # One legend is enough for the three charts. With a ghost there is no legend, as a legend would
-            # name each joint twice.
-            legend=last and not ghost,
-        )
-
-    def _one(self, title: str, kind: int, joint: int, ghost: bool) -> Chart:
-        line = ChartLine(joints_named(self._robot.joint_names[joint]), joint_colour(joint), width=2.0)
-        return Chart(
-            self._gui,
-            self._in_view,
-            f"{title}, {self._unit(kind, joint)[0]}",
-            [
-                line,
-                ChartLine("upper bound", BOUND, dashed=True),
-                ChartLine("lower bound", BOUND, dashed=True),
-                ChartLine("at bound", BAD, fill=0.5, width=0.5),
-                *of_ghost([line], ghost),
-            ],
-            self._span(kind, joint),
-            height=170,
-            bands=((1, 2, GOOD),),
-            legend=kind == 2,
-        )
-
-
-def quantities(window: PlotWindow, driven: Input, sheet: Sheet) -> list[_Quantity]:
-    """Returns input, velocity and position of all joints with their bounds. sheet: see `data_sheet`."""
+def quantity(window: PlotWindow, driven: Input, sheet: Sheet, kind: int) -> _Quantity:
+    """Returns the input (kind 0), velocity (1) or position (2) of all joints with its bounds. sheet: see
+    `data_sheet`."""
     columns, fields = window.columns, window.layout.fields
-    v, upper = columns(fields["v_limit"]), columns(fields[driven.upper])
-    lower = -upper if driven.lower is None else columns(fields[driven.lower])
-    found = (
-        (driven.title, driven.value, lower, upper),
-        ("Velocity", "v", -v, v),
-        ("Position", "q", columns(fields["q_lower"]), columns(fields["q_upper"])),
+    field, low, high = (
+        (driven.value, driven.lower, driven.upper),
+        ("v", None, "v_limit"),
+        ("q", "q_lower", "q_upper"),
+    )[kind]
+    upper = columns(fields[high])
+    lower = -upper if low is None else columns(fields[low])
+    return _Quantity(
+        columns(fields[field]),
+        np.where(np.isfinite(lower), lower, sheet[kind][0]),
+        np.where(np.isfinite(upper), upper, sheet[kind][1]),
     )
-    return [
-        _Quantity(
-            title,
-            columns(fields[field]),
-            np.where(np.isfinite(lower), lower, sheet_lower),
-            np.where(np.isfinite(upper), upper, sheet_upper),
-        )
-        for (title, field, lower, upper), (sheet_lower, sheet_upper) in zip(found, sheet, strict=True)
-    ]
+
+
+def _rug(at_bound: np.ndarray | np.bool_, low: float, high: float) -> np.ndarray:
+    """Returns the marks at the bottom of a chart while a joint is at its bound."""
+    return np.where(at_bound, low + _RUG * (high - low), low)
 
 
 def data_sheet(robot: Robot, driven: Input) -> Sheet:

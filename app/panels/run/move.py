@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import viser
 
-from app.client.pending_edit import HOLD
-from app.panels.widgets.command import on_click
+from app.panels.widgets.command import on_change, on_click
 from app.panels.widgets.controls import in_colours_of_axes
-from app.view.drag_target import Movable
+from app.tab.mirror import HOLD
+from app.view.targets import Movable
 
 _STEPS = {"1 mm": 1e-3, "1 cm": 1e-2, "5 cm": 5e-2}
 _FIRST = "1 cm"
@@ -53,11 +53,7 @@ class MovePanel:
             )
             gui.add_html(in_colours_of_axes(self._turn))
         for field in self._fields:
-
-            @field.on_update
-            async def _(event: viser.GuiEvent[viser.GuiNumberHandle[float]]) -> None:
-                if event.client is not None:
-                    self._moved()
+            on_change(field, self._moved)
 
         @self._step.on_update
         async def _(_: object) -> None:
@@ -91,11 +87,9 @@ class MovePanel:
         at = None if chosen is None else chosen.place()
         movable = chosen is not None and chosen.move is not None
         turns = chosen is not None and chosen.turn is not None
-        if self._turn.visible != turns:
-            self._turn.visible = turns
+        self._turn.visible = turns
         for field, value in zip(self._fields, np.zeros(3) if at is None else at, strict=True):
-            if field.visible != movable:
-                field.visible = movable
+            field.visible = movable
             shown = round(float(value), _DIGITS)
             # A field that was just used keeps its value, even if the robot's reach limits the target.
             if at is not None and time.monotonic() - self._touched > HOLD and field.value != shown:

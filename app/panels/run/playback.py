@@ -1,5 +1,5 @@
-"""Controls for run, pause, step, speed and reset, and the real-time factor. They are always visible above the
-tabs."""
+"""Run, pause, step, speed and reset, with the real-time factor, and a slider for looking back while paused.
+They are always visible above the tabs."""
 
 from __future__ import annotations
 
@@ -8,17 +8,14 @@ import time
 from contextlib import nullcontext
 from functools import partial
 
-import viser
-
-from app.adapter.removed_handle_errors import unless_removed
-from app.client.pending_edit import HOLD, PendingEdit
+from app.adapter.private import unless_removed
 from app.client.simulation import Trouble
 from app.html.palette import LEVELS, ink
 from app.html.text import block, esc, in_trouble
 from app.link.messages import Play, Post, Speed, Status, StepTicks
-from app.panels.context import PageContext
-from app.panels.widgets.command import add_command, on_click
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.panels.widgets.command import add_command, on_change, on_click
+from app.tab.context import PageContext, SessionSnapshot
+from app.tab.mirror import HOLD, PendingEdit
 from lessons.events import Reset
 from lessons.settings.settings import SceneSettings
 
@@ -32,12 +29,7 @@ _KEPT = 0.9
 class PlaybackPanel:
     """Buttons and a status line."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        fastest: float,
-        brief: bool,
-    ) -> None:
+    def __init__(self, page: PageContext, fastest: float, brief: bool) -> None:
         """fastest: the highest selectable speed, simulated seconds per second; brief: whether the controls
         that a lesson does not need are folded."""
         gui, self._learner, self._loop = page.gui, page.learner, page.loop
@@ -69,11 +61,11 @@ class PlaybackPanel:
         on_click(self._buttons, lambda: self._click(str(self._buttons.value)))
         self._again.on_click(lambda _: page.learner.restart())  # on a thread, as it starts a process
 
-        @self._speed.on_update
-        async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-            if event.client is not None:
-                self._touched = time.monotonic()
-                page.send(Speed(float(self._speed.value)))
+        def choose_speed() -> None:
+            self._touched = time.monotonic()
+            page.send(Speed(float(self._speed.value)))
+
+        on_change(self._speed, choose_speed)
 
         for label, key, choice in (
             ("Run or pause", "space", _RUN),
@@ -122,8 +114,7 @@ class PlaybackPanel:
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         status = now.status
         choices = self._choices(status.running)
-        if self._buttons.options != choices:
-            self._buttons.options = choices
+        self._buttons.options = choices
         self._loop.call_soon_threadsafe(unless_removed, self._show_speed, status.speed)
         self._status.content = headline(status, now.settings.T_s)
 
@@ -151,3 +142,88 @@ def _pace(factor: float, speed: float, capped: bool) -> str:
         words = f"slower than real time ({factor:.1g} ×)"
         return f'<span title="{why}" style="color:{ink(LEVELS[0])}">{words}</span>'
     return "real time" if abs(factor - 1.0) < 1.0 - _KEPT else f"{factor:.1f} × real time"
+
+
+_SLIDER_STEP = 0.05  # s
+_SHORT, _LONG = 0.1, 1.0  # s per key press
+_LEAST = 0.2  # s: the slider is shown only if the history is longer than this
+
+
+class TimeLine:
+    """The time line. `past` is the past moment that is shown, or None for the present. When simulated time
+    continues (run, step or reset), the view returns to the present."""
+
+    def __init__(self, page: PageContext) -> None:
+        gui, self._learner, self._loop = page.gui, page.learner, page.loop
+        self.past: float | None = None
+        self._paused_at: float | None = None  # s, simulated time at which the run is paused
+        self._closed = False
+        self._slider = gui.add_slider(
+            "Look back [s]",
+            min=-_LEAST,
+            max=0.0,
+            step=_SLIDER_STEP,
+            initial_value=0.0,
+            visible=False,
+            hint="Shows robot, targets, traces and plots at an earlier time, up to a minute ago. "
+            f"J and K: {_SHORT:g} s, with Shift {_LONG:g} s; in the slider also ← and →.",
+        )
+        self._live = gui.add_button("Back to now", visible=False)
+        self._words = gui.add_html("", visible=False)
+
+        on_change(self._slider, lambda: self._look(float(self._slider.value)))
+        on_click(self._live, lambda: self._set(0.0))
+
+        for words, key, shift, seconds in (
+            ("Look back a little", "J", False, -_SHORT),
+            ("Look forward a little", "K", False, _SHORT),
+            ("Look back a second", "J", True, -_LONG),
+            ("Look forward a second", "K", True, _LONG),
+        ):
+            add_command(gui, words, key, partial(self._shift, seconds), shift)
+
+    def _shift(self, seconds: float) -> None:
+        if self._paused_at is not None:
+            self._set(float(self._slider.value) + seconds)
+
+    def _set(self, ago: float) -> None:
+        if not self._closed:
+            self._slider.value = round(min(0.0, max(float(self._slider.min), ago)), 3)
+            self._look(float(self._slider.value))
+
+    def _look(self, ago: float) -> None:
+        """Chooses the moment that is shown. ago: its time relative to the pause, s, ≤ 0."""
+        at = self._paused_at
+        self.past = None if at is None or ago > -0.5 * _SLIDER_STEP else at + ago
+
+    def update(self, running: bool) -> None:
+        """Shows or hides the slider; called for every frame, before the page reads `past`."""
+        first, last = self._learner.tape.span
+        if running or last - first < _LEAST:
+            if self._paused_at is not None:
+                self._leave()
+        elif self._paused_at != last:
+            self._enter(first, last)
+        self._say()
+
+    def _enter(self, first: float, last: float) -> None:
+        self.past, self._paused_at = None, last
+        self._slider.min = round(-math.floor((last - first) / _SLIDER_STEP) * _SLIDER_STEP, 3)
+        self._loop.call_soon_threadsafe(unless_removed, self._set, 0.0)
+        self._slider.visible = True
+
+    def _leave(self) -> None:
+        self.past = self._paused_at = None
+        self._slider.visible = False
+        self._loop.call_soon_threadsafe(unless_removed, self._set, 0.0)
+
+    def _say(self) -> None:
+        past, at = self.past, self._paused_at
+        looking = past is not None and at is not None
+        self._live.visible = self._words.visible = looking
+        if past is not None and at is not None:
+            text = block(f"<b>Looking back</b>: t = {past:.2f} s, {at - past:.2f} s before the pause")
+            self._words.content = text
+
+    def close(self) -> None:
+        self._closed = True

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import viser
 
-from app.adapter.removed_handle_errors import unless_removed
+from app.adapter.private import unless_removed
 from app.html.palette import BAD, DAMPING, GOOD, LEVELS, css
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.link.threads import on_thread
-from app.panels.context import PageContext
 from app.panels.widgets.command import on_click
+from app.tab.context import PageContext
 from lessons.experiments.verdict import verdict
 from lessons.own.files import Folder, is_file, is_lesson
 from lessons.scenes.names import ALL_SCENES
@@ -30,13 +30,8 @@ class RobotPanel:
     """The panel of robot and scene. A choice becomes a `SceneChoice`; the simulation answers with the new
     scene or with the reason of a refusal."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        own_files: Folder | None,
-    ) -> None:
-        """own_files: the folder whose files this page may name by path; None if it may name no files."""
-        gui, ready, scenes = page.gui, page.ready, ALL_SCENES
+    def __init__(self, page: PageContext) -> None:
+        gui, ready, scenes, own_files = page.gui, page.ready, ALL_SCENES, page.own_files
         robot = ready.robot
         self._choose = page.choose
         gui.add_html(
@@ -89,10 +84,7 @@ class RobotPanel:
                 path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
                 load_path = gui.add_button("Load file")
 
-                on_click(
-                    load_path,
-                    lambda: self._ask_file(of_urdf, own_files, asked(path.value.strip())),
-                )
+                on_click(load_path, lambda: self._ask_file(of_urdf, own_files, asked(path.value.strip())))
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=_UPLOADED)
             gui.add_html(

@@ -10,10 +10,9 @@ import viser
 
 from app.html.palette import BAD, GOOD
 from app.html.text import bar, block, esc, formula, joint_labels
-from app.panels.context import PageContext
-from app.panels.inside.spectrum import SpectrumPicture
+from app.panels.inside.matrix import SpectrumPicture
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from lessons.settings.period import USUAL, longest_period
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
@@ -92,6 +91,17 @@ def _measured(name: str, value: float) -> str:
 
 def _verdict(value: float) -> str:
     return "" if value != value else " &lt; 1 ✓" if value < 1 else " ≥ 1"
+
+
+def add_plant(page: PageContext) -> None:
+    """Adds the controls of the true plant's settings. The controller does not know them."""
+    page.gui.add_html(
+        block("These are the true values of the simulated robot. The controller does not know them.")
+    )
+    # One factor per link, named by the joint that moves the link.
+    links = {"plant.mass_scale": "Mass of each link", "plant.inertia_scale": "Inertia of each link"}
+    controls = Controls(page.gui, page.bindings, page.settings)
+    controls.add_group("Plant", links, joint_labels(page.robot.joint_names))
 
 
 class DeadlineFolder:

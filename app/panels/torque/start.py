@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import viser
 
 from app.html.palette import BAD, BOUND, GOOD, RGB, TARGET, ink
 from app.html.text import block, esc, joint_labels, joints_named, quantity, swatch
 from app.link.messages import TaskView
-from app.panels.context import PageContext
 from app.panels.widgets.command import add_command, on_click
-from app.panels.widgets.controls import in_colours_of_axes
-from app.panels.widgets.snapshot import SessionSnapshot
-from app.view.coordinates import draggable
-from app.view.reachability import Reachability
+from app.panels.widgets.controls import add_dark_switch, in_colours_of_axes
+from app.tab.context import PageContext, SessionSnapshot
+from app.view.drag import Reachability
+from app.view.targets import draggable
 from himpc.stack import Level
 from lessons.events import Push, Set
 from lessons.settings.torque import TorqueSettings
@@ -119,15 +117,10 @@ def _paragraph(head: str, rest: str) -> str:
 class StartPanel:
     """The controls of the first tab, and a guide that depends on what the learner has already done."""
 
-    def __init__(
-        self,
-        page: PageContext,
-    ) -> None:
-        gui, ready, self._colours = page.gui, page.ready, page.colours
-        self.on_recall: Callable[[], None] = lambda: None
-        self._dragged = False
-        told = guide(ready.tasks, page.settings.levels, page.colours, dragged=False)
-        self._guide = gui.add_html(told)
+    def __init__(self, page: PageContext, recall: Callable[[], object]) -> None:
+        """recall: brings the target to the hand."""
+        gui, ready, self._page = page.gui, page.ready, page
+        self._guide = gui.add_html(guide(ready.tasks, page.settings.levels, page.colours, dragged=False))
         draggable = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
         self._where = gui.add_html("", visible=draggable)
         with gui.add_folder("Target", visible=draggable):
@@ -137,7 +130,7 @@ class StartPanel:
                 hint="On: the controller gets the nearest point that the robot can reach. "
                 "Off: the controller gets your point unchanged, and you see how a singular arm moves.",
             )
-            recall = gui.add_button("Bring the target to the hand")
+            on_click(gui.add_button("Bring the target to the hand"), recall)
         with gui.add_folder("Push the robot"):
             robot, names = ready.robot, ready.robot.joint_names
             self._kg = sensible_payload(
@@ -184,7 +177,7 @@ class StartPanel:
                 hint="The capsules that contain the links. A controller that keeps distances measures them "
                 "between these capsules, which are a few millimetres thicker than the links",
             )
-        self.dark = gui.add_checkbox("Dark theme", page.dark)
+        add_dark_switch(page)
 
         @buttons.on_click
         async def _(_: object) -> None:
@@ -198,19 +191,8 @@ class StartPanel:
         async def _(_: object) -> None:
             page.post(Set("plant.payload_kg", 0.0 if self._load.label == _DROP else self._kg))
 
-        on_click(recall, lambda: self.on_recall())
-
-        @self.dark.on_update
-        async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
-            if event.client is not None:
-                page.theme(bool(self.dark.value))
-
     def _grab(self) -> None:
         self.pull.value = not self.pull.value
-
-    def dragged(self) -> None:
-        """Called when a target is dragged: the guide then shows the next step."""
-        self._dragged = True
 
     def show_verdict(self, verdict: Reachability | None, clamped: bool) -> None:
         """Shows a sentence about the state of the target."""
@@ -239,9 +221,5 @@ class StartPanel:
     def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         """Updates the names of the levels in the guide, and the label of the button."""
         tasks, levels = now.ready.tasks, now.settings.levels
-        told = guide(tasks, levels, self._colours, self._dragged)
-        if self._guide.content != told:
-            self._guide.content = told
-        label = _DROP if now.settings.plant.payload_kg > 0 else self._pick_up
-        if self._load.label != label:
-            self._load.label = label
+        self._guide.content = guide(tasks, levels, self._page.colours, self._page.dragged)
+        self._load.label = _DROP if now.settings.plant.payload_kg > 0 else self._pick_up

@@ -1,102 +1,179 @@
-"""The stack as an ordered list of levels with their tasks, and the form for one more task."""
+"""The stack as an ordered list of levels with their tasks, and the forms for a task: for a new one, and to
+change name, frame and axes while the robot moves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from functools import partial
+from typing import Any
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.client.pending_edit import PendingEdit
-from app.html.palette import BOUND, DAMPING
-from app.html.text import block, esc, formula, joints_named, swatch
-from app.panels.context import PageContext
-from app.panels.torque.task_editor import AddTask, TaskEditor
+from app.html.palette import BAD, DAMPING, RGB, button
+from app.html.text import block, esc, formula, joint_labels, joints_named, swatch
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.level_row import DOWN, MORE, OFF, ON, UP, LevelRow, error_in_words
-from app.panels.widgets.mirror import Bindings
-from app.panels.widgets.snapshot import SessionSnapshot
-from himpc.stack import Level
-from himpc.tasks import Joints, Posture
+from app.panels.widgets.level_row import DOWN, MORE, UP, LevelRow, error_in_words
+from app.tab.context import PageContext, SessionSnapshot
+from app.tab.mirror import Bindings, PendingEdit
+from himpc.stack import Level, Stack
+from himpc.tasks import KINDS, Joints, Posture, Task
+from himpc.tasks.axes import OnAxes
+from himpc.tasks.kinds import description
+from himpc.tasks.pointing import DIRECTIONS
 from lessons.events import Event, MoveLevel, MoveTarget, Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 from robots.joints import joint_axis
+
+AXES = ("xyz", "xy", "xz", "yz", "x", "y", "z")
+_NORMALS = {"z, the floor": (0.0, 0.0, 1.0), "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
+_TOGETHER = "together with "
+_OWN = "a level of its own, at place "
+
+
+class TaskEditor:
+    """The controls of one task. Each is in an unnamed folder, see `Controls`."""
+
+    def __init__(
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], task: Task, robot: Robot, alone: bool
+    ) -> None:
+        """alone: whether the task has a level of its own."""
+        self._gui, self._bindings, self._task = gui, bindings, task
+        name = task.name
+        gui.add_html(block(f"<b>{esc(name)}</b>: {esc(description(task))}"))
+        if hasattr(task, "frame"):
+            self._menu("Frame", "frame", robot.frames, robot.tip)
+        if hasattr(task, "root"):
+            self._menu("Seen from", "root", robot.frames, robot.frames[0])
+        if hasattr(task, "axis"):
+            self._menu("Axis", "axis", DIRECTIONS, "z")
+        if isinstance(task, OnAxes):
+            self._menu("Axes", "axes", AXES if task.axes in AXES else (*AXES, task.axes), "xyz")
+        with gui.add_folder(None):
+            text = gui.add_text("Name", name)
+        self._button("Rename", lambda: Set("stack.rename", [name, text.value[:100]]))
+        if not alone:
+            self._button(f"Own level for {name}", lambda: Set("stack.split", name))
+        self._button(f"Remove {name}", lambda: Set("stack.remove", name), BAD)
+
+    def _menu(self, label: str, field: str, options: Sequence[str], usual: str) -> None:
+        """usual: the meaning of an empty field."""
+        name = self._task.name
+
+        def read(settings: TorqueSettings) -> str:
+            tasks = (task for level in settings.levels for task in level.tasks if task.name == name)
+            return str(getattr(next(tasks, self._task), field, "")) or usual
+
+        with self._gui.add_folder(None):
+            now = str(getattr(self._task, field)) or usual
+            menu = self._gui.add_dropdown(label, tuple(options), initial_value=now)
+        self._bindings.bind(menu, read, lambda value: Set("stack.edit", {"name": name, field: str(value)}))
+
+    def _button(self, label: str, event: Callable[[], Set], colour: RGB | None = None) -> None:
+        self._gui.add_button(label, color=colour and button(colour)).on_click(
+            lambda _: self._bindings.post(event())
+        )
+
+
+class AddTask:
+    """A folder whose controls depend on the chosen kind of task. The button Add creates the task."""
+
+    def __init__(self, page: PageContext) -> None:
+        gui, robot, stack = page.gui, page.robot, page.settings.levels
+        own = self._own = dict(page.settings.own_tasks)  # tasks of the user's own files, by path
+        self._joints = dict(zip(joint_labels(robot.joint_names), robot.joint_names, strict=True))
+        with gui.add_folder("Add a task", expand_by_default=False, order=899.0):
+            self._kind = gui.add_dropdown("Kind", (*KINDS, *own), initial_value="position")
+            self._says = gui.add_html("")
+
+            def menu(label: str, options: Sequence[str], first: str, hint: str | None = None) -> Any:
+                with gui.add_folder(None):
+                    return gui.add_dropdown(label, tuple(options), initial_value=first, hint=hint)
+
+            frames, places = robot.frames, _places(stack)
+            self._frame = menu("Of frame", frames, robot.tip, "You can also click a link, see below")
+            with gui.add_folder(None):
+                self._pick = gui.add_checkbox(
+                    "Click a link",
+                    False,
+                    hint="While this is on, a click on a link of the robot chooses the link",
+                )
+            self._root = menu("As seen from", frames, frames[0])
+            self._axes = menu("Along axes", AXES, AXES[0])
+            self._axis = menu("Its axis", DIRECTIONS, "z")
+            self._normal = menu("Plane across", tuple(_NORMALS), next(iter(_NORMALS)))
+            self._joint = menu("Of joint", tuple(self._joints), next(iter(self._joints)))
+            self._level = menu("On level", places, places[1])
+            with gui.add_folder(None):
+                self._name = gui.add_text("Its name", "", hint="If empty, the name of the kind")
+            self._add = gui.add_button("Add")
+        self._add.on_click(lambda _: page.post(Set("stack.add", self._wish())))
+        self._kind.on_update(lambda _: self._show())
+        self._show()
+
+    @property
+    def picking(self) -> bool:
+        """Whether a click on a link chooses the frame."""
+        return bool(self._pick.value)
+
+    def choose(self, frame: str) -> None:
+        """Chooses the link that was clicked."""
+        if frame in self._frame.options:
+            self._frame.value = frame
+
+    def _needs(self) -> set[str]:
+        own = self._own.get(self._kind.value)
+        found = {each.name for each in fields(own or KINDS[self._kind.value].makes[0])}
+        return found - {"joints"} if self._kind.value in ("posture", "damping") else found
+
+    def _show(self) -> None:
+        needs = self._needs()
+        own = self._own.get(self._kind.value)
+        self._says.content = block(esc(description(own)) if own else KINDS[self._kind.value].says)
+        for field, handle in (
+            ("frame", self._frame),
+            ("frame", self._pick),
+            ("root", self._root),
+            ("axes", self._axes),
+            ("axis", self._axis),
+            ("normal", self._normal),
+            ("joints", self._joint),
+        ):
+            handle.visible = field in needs
+
+    def _wish(self) -> dict[str, Any]:
+        needs = self._needs()
+        given = {
+            "frame": self._frame.value,
+            "root": self._root.value,
+            "axes": self._axes.value,
+            "axis": self._axis.value,
+            "normal": list(_NORMALS[self._normal.value]),
+            "joints": [self._joints[self._joint.value]],
+        }
+        wish: dict[str, Any] = {"task": self._kind.value}
+        wish |= {field: value for field, value in given.items() if field in needs}
+        if self._name.value.strip():
+            wish["name"] = self._name.value.strip()[:100]
+        level = self._level.value
+        if level.startswith(_TOGETHER):
+            return wish | {"with": level.removeprefix(_TOGETHER)}
+        return wish | {"level": int(level.removeprefix(_OWN))}
+
+
+def _places(stack: Stack) -> tuple[str, ...]:
+    own = [f"{_OWN}{place}" for place in range(1, len(stack) + 2)]
+    return (*own, *(f"{_TOGETHER}{level.name}" for level in stack))
+
 
 Targets = Mapping[str, NDArray[np.float64]]
 """The raw targets that can be moved, by task."""
 
 _TURN, _WAY = np.pi, 2.0
 """Range of a slider on both sides of zero for a joint without limits, rad and m."""
-
-
-class LevelCard:
-    """The row of one level, with its settings; over the scene the same row without settings."""
-
-    def __init__(
-        self,
-        page: PageContext,
-        bindings: Bindings[TorqueSettings],
-        level: Level,
-        place: int,
-        targets: Callable[[], Targets],
-        moves: Bindings[Targets],
-        press: Callable[[str, str], None],
-        opened: bool,
-        unfolded: bool,
-        strip: viser.GuiFolderHandle | None,
-    ) -> None:
-        """bindings: for the controls of this stack; targets: returns the present targets, which `moves`
-        shows; press: called with the name of the level
-        and the button that was pressed; opened: whether its settings are open; unfolded: whether the controls
-        that edit the tasks are unfolded; strip: the place over the scene."""
-        gui, robot, settings = page.gui, page.robot, page.settings
-        name = self.name = level.name
-        hint = f"On or off: key {place + 1}. ▲ ▼: priority"
-        colour, buttons = page.colours.get(name, BOUND), (ON if level.enabled else OFF, UP, DOWN)
-        settings_hint = f"{hint}. ⋯: gains, weights and tasks of this level"
-        row = LevelRow(gui, name, colour, buttons, settings_hint, partial(press, name), opened or unfolded)
-        self._rows = [row]
-        if strip is not None:
-            with strip:
-                self._rows.append(LevelRow(gui, name, colour, buttons, hint, partial(press, name), None))
-        for shown in self._rows:
-            shown.update(place, self._title(place), level.enabled)
-        with row.details:
-            controls = Controls(gui, bindings, settings)
-            controls.add(f"levels.{name}.Q", f"levels.{name}.R")
-            for task in level.tasks:
-                if len(level.tasks) > 1:
-                    gui.add_html(block(f"<b>{esc(task.name)}</b>"))
-                controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
-            add_joint_targets(gui, moves, level, robot, targets)
-            with gui.add_folder("Change", expand_by_default=unfolded):
-                for task in level.tasks:
-                    TaskEditor(gui, bindings, task, robot, alone=len(level.tasks) == 1)
-                if place > 0:
-                    above = settings.levels[place - 1].name
-                    merge = gui.add_button("Merge with the level above")
-                    merge.on_click(lambda _: bindings.post(Set("stack.merge", [name, above])))
-
-    def _title(self, place: int) -> str:
-        return f"{place + 1} · {self.name}"
-
-    def update(self, now: SessionSnapshot[TorqueSettings], level: Level, place: int) -> None:
-        errors = [(task.name, now.error(task.name), task.unit) for task in level.tasks]
-        found = now.status.ranks.get(level.name)
-        for row in self._rows:
-            row.update(
-                place,
-                self._title(place),
-                level.enabled,
-                max((value for _, value, _ in errors), default=0.0),
-                error_in_words(errors),
-                "" if found is None or not level.enabled else f"{found[0]}/{found[1]} free",
-                _rank(found),
-                now.fallback(level.name) if level.enabled else "",
-            )
 
 
 def _rank(found: tuple[int, int] | None) -> str:
@@ -111,11 +188,7 @@ def _rank(found: tuple[int, int] | None) -> str:
 
 
 def add_joint_targets(
-    gui: viser.GuiApi,
-    bindings: Bindings[Targets],
-    level: Level,
-    robot: Robot,
-    targets: Callable[[], Targets],
+    gui: viser.GuiApi, bindings: Bindings[Targets], level: Level, robot: Robot, targets: Callable[[], Targets]
 ) -> None:
     """Adds a folder with a slider for each joint of every joint-space task whose target can be moved. If
     there is no such task, no folder is added.
@@ -192,10 +265,7 @@ class TasksPanel:
     """One row per level, in the order of priority. Another stack needs other folders: see `rebuild`."""
 
     def __init__(
-        self,
-        page: PageContext,
-        targets: Callable[[], Targets],
-        strip: viser.GuiTabHandle | None,
+        self, page: PageContext, targets: Callable[[], Targets], strip: viser.GuiTabHandle | None
     ) -> None:
         """targets: returns the present targets; strip: the tab of a panel over the scene, which shows the
         rows, too. In a lesson, whose stack is given, no task can be added."""
@@ -237,23 +307,44 @@ class TasksPanel:
             with self._strip:
                 self._rows_over_scene = self._page.gui.add_folder(None)
         with self._levels:
-            self._cards = [
-                LevelCard(
-                    self._page,
-                    self._bindings,
-                    level,
-                    place,
-                    self._targets,
-                    self._moves,
-                    self._press,
-                    opened=level.name in self._open,
-                    unfolded=any(task.name == self._edited for task in level.tasks),
-                    strip=self._rows_over_scene,
-                )
-                for place, level in enumerate(settings.levels)
-            ]
+            self._rows = {
+                level.name: self._add_level(level, place) for place, level in enumerate(settings.levels)
+            }
             if not self._page.in_lesson:
                 self._add = AddTask(self._page)
+
+    def _add_level(self, level: Level, place: int) -> LevelRow:
+        """Adds the row of a level, with its settings and the controls that edit its tasks. These are unfolded
+        if one of the tasks was just edited."""
+        page, name, settings = self._page, level.name, self._page.settings
+        unfolded = any(task.name == self._edited for task in level.tasks)
+        hint = f"On or off: key {place + 1}. ▲ ▼: priority"
+        row = LevelRow(
+            page,
+            level,
+            place,
+            (UP, DOWN),
+            (hint, f"{hint}. ⋯: gains, weights and tasks of this level"),
+            partial(self._press, name),
+            self._rows_over_scene,
+            opened=name in self._open or unfolded,
+        )
+        with row.details:
+            controls = Controls(page.gui, self._bindings, settings)
+            controls.add(f"levels.{name}.Q", f"levels.{name}.R")
+            for task in level.tasks:
+                if len(level.tasks) > 1:
+                    page.gui.add_html(block(f"<b>{esc(task.name)}</b>"))
+                controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
+            add_joint_targets(page.gui, self._moves, level, page.robot, self._targets)
+            with page.gui.add_folder("Change", expand_by_default=unfolded):
+                for task in level.tasks:
+                    TaskEditor(page.gui, self._bindings, task, page.robot, alone=len(level.tasks) == 1)
+                if place > 0:
+                    above = settings.levels[place - 1].name
+                    merge = page.gui.add_button("Merge with the level above")
+                    merge.on_click(lambda _: self._bindings.post(Set("stack.merge", [name, above])))
+        return row
 
     def _ask(self, event: Event) -> None:
         """Posts an edit. The folder of the edited task stays unfolded in the resulting stack."""
@@ -323,9 +414,20 @@ class TasksPanel:
 
     def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         for place, level in enumerate(now.settings.levels):
-            for card in self._cards:
-                if card.name == level.name:
-                    card.update(now, level, place)
+            row = self._rows.get(level.name)
+            if row is None:
+                continue  # the rows are not rebuilt yet
+            errors = [(task.name, now.error(task.name), task.unit) for task in level.tasks]
+            rank = now.status.ranks.get(level.name)
+            row.update(
+                place,
+                level.enabled,
+                max((value for _, value, _ in errors), default=0.0),
+                error_in_words(errors),
+                "" if rank is None or not level.enabled else f"{rank[0]}/{rank[1]} free",
+                _rank(rank),
+                now.fallback(level.name) if level.enabled else "",
+            )
         self._bindings.refresh(now.settings)
         self._moves.refresh(self._targets())
         cost = now.number("cost/damping")

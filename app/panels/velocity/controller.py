@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from app.html.text import block, esc, formula
-from app.panels.context import PageContext
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.tab.context import PageContext, SessionSnapshot
 from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import base_joints
 from himpc.htmpc.settings import efforts
@@ -96,6 +95,14 @@ class HtmpcPanel:
             + ("this time delays the robot." if settings.delay_measured else "simulated time waits."),
             lines=3,
         )
+
+
+def add_servo_plant(page: PageContext) -> None:
+    """Adds the controls of the true plant's settings. The controller knows at most its lag."""
+    page.gui.add_html(
+        block("These are the true values of the simulated robot. The controller knows at most the lag.")
+    )
+    Controls(page.gui, page.bindings, page.settings).add_group("Plant")
 
 
 def _compensated(settings: VelocitySettings) -> str:

@@ -1,19 +1,23 @@
-"""The mission as a list of completed, active and future tasks, with the buttons that change it."""
+"""The mission as a list of completed, active and future tasks, with the buttons that change it, and a row for
+the point that each level moves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+import viser
 
 from app.html.palette import GOOD, RGB, button, css
-from app.html.text import badge, block, esc, free_name, swatch
-from app.link.mission_view import MissionRow
-from app.panels.context import PageContext
+from app.html.text import badge, block, esc, free_name, quantity, swatch
+from app.link.messages import MissionRow
 from app.panels.widgets.command import on_click
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.snapshot import SessionSnapshot
-from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
+from app.panels.widgets.level_row import MORE, LevelRow
+from app.tab.context import PageContext, SessionSnapshot
+from app.tab.mirror import PendingEdit
+from lessons.events import InsertTask, MoveLevel, Release, RemoveTask, Set
 from lessons.settings.missions import ArchitectureOptions, PerceptionOptions
 from lessons.settings.velocity import VelocitySettings
 
@@ -25,11 +29,7 @@ _DONE_SHOWN = 3
 class MissionPanel:
     """The list of tasks, the button Release, and controls that insert, remove and reorder tasks."""
 
-    def __init__(
-        self,
-        page: PageContext,
-        places: Callable[[], dict[str, np.ndarray]],
-    ) -> None:
+    def __init__(self, page: PageContext, places: Callable[[], dict[str, np.ndarray]]) -> None:
         """places: returns the position at which each role's goal is drawn, (3,) m."""
         gui, settings = page.gui, page.settings
         controls, options = Controls(gui, page.bindings, settings), settings.options
@@ -64,7 +64,7 @@ class MissionPanel:
 
         @self._release.on_click
         async def _(_: object) -> None:
-            waiting = _waiting(mission_rows(page))
+            waiting = _waiting(page.mission_rows or ())
             if waiting is not None:
                 page.post(Release(waiting.name))
 
@@ -83,7 +83,7 @@ class MissionPanel:
         return round(float(x), 2), round(float(y), 2), round(float(z), 2)
 
     def _changed(self, what: str, name: str) -> None:
-        ahead = [row.name for row in mission_rows(self._page) if row.state != "done"]
+        ahead = [row.name for row in self._page.mission_rows or () if row.state != "done"]
         if name not in ahead:
             return
         if what == _REMOVE:
@@ -97,7 +97,7 @@ class MissionPanel:
         role, before = str(self._role.value), str(self._before.value)
         axes = self._points[role].axes
         goal = tuple(float(self._goal.value["xyz".index(axis)]) for axis in axes)
-        name = free_name(f"{role} added", [row.name for row in mission_rows(self._page)])
+        name = free_name(f"{role} added", [row.name for row in self._page.mission_rows or ()])
         self._page.post(
             InsertTask(name, role, goal, None if before == _END else before, hold=None if hold else 0.0)
         )
@@ -117,18 +117,13 @@ class MissionPanel:
         waiting = _waiting(mission.rows)
         self._swap.visible = len(ahead) > 1
         self._release.visible = waiting is not None
-        if waiting is not None and self._release.label != f"Release {waiting.name}":
+        if waiting is not None:
             self._release.label = f"Release {waiting.name}"
-
-
-def mission_rows(page: PageContext) -> tuple[MissionRow, ...]:
-    status = page.learner.status
-    return () if status is None or status.mission is None else status.mission.rows
 
 
 def swap(page: PageContext) -> None:
     """Moves the second open task to the first place."""
-    ahead = [row.name for row in mission_rows(page) if row.state != "done"]
+    ahead = [row.name for row in page.mission_rows or () if row.state != "done"]
     if len(ahead) > 1:
         page.post(MoveLevel(ahead[1], 0))
 
@@ -189,3 +184,56 @@ def _when(row: MissionRow) -> str:
     if row.hold is None:
         return "until released"
     return f"hold {row.hold:g} s" if row.hold else ""
+
+
+class RolesPanel:
+    """One row per role, in the order of the mission's window."""
+
+    def __init__(self, page: PageContext, strip: viser.GuiTabHandle | None) -> None:
+        """strip: the tab of a panel over the scene, which shows the rows, too."""
+        self._page, levels = page, page.settings.levels
+        self._order = tuple(level.name for level in levels)
+        self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
+        page.gui.add_html(block("The mission below sets the order of the levels."), order=-1.0)
+        hints = "On or off", "⋯: the weight of this level"
+        self._rows = [
+            LevelRow(page, level, place, (), hints, partial(self._press, level.name), strip)
+            for place, level in enumerate(levels)
+        ]
+        for row in self._rows:
+            with row.details:
+                Controls(page.gui, page.bindings, page.settings).add(f"levels.{row.name}.Q")
+
+    def toggle(self, place: int) -> Set | None:
+        """Returns the event for the hotkey of an index (0-based); None if there is no such level."""
+        if place >= len(self._order):
+            return None
+        return self._switch(self._order[place])
+
+    def _press(self, name: str, button: str) -> None:
+        if button != MORE:
+            self._page.post(self._switch(name))
+
+    def _switch(self, name: str) -> Set:
+        enabled = next(level.enabled for level in self._page.settings.levels if level.name == name)
+        wish = self._enabled[name]
+        return Set(f"levels.{name}.enabled", wish.ask(not wish.now(enabled)))
+
+    def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
+        places = {level.name: now.number(f"level/{level.name}") for level in now.settings.levels}
+        inside = sorted((name for name in places if places[name] == places[name]), key=places.__getitem__)
+        self._order = (*inside, *(name for name in places if name not in inside))
+        levels = {level.name: level for level in now.settings.levels}
+        for row in self._rows:
+            level, name = levels[row.name], row.name
+            task, error = level.tasks[0], now.error(level.tasks[0].name)
+            bound, has_task = now.number(f"bound/{name}"), name in inside
+            row.update(
+                self._order.index(name),
+                level.enabled,
+                error if has_task else 0.0,
+                f"<b>{quantity(error, task.unit)}</b>" if has_task else "no task now",
+                f"≤ {quantity(bound, task.unit)}" if has_task and bound == bound else "",
+                "Levels below may increase the error of this level to this bound",
+                now.fallback(name) if has_task else "",
+            )

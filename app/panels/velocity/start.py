@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-
-import viser
+from functools import partial
 
 from app.html.text import badge, block, esc, quantity, swatch
-from app.panels.context import PageContext
 from app.panels.velocity.mission import swap
 from app.panels.widgets.command import on_click
-from app.panels.widgets.snapshot import SessionSnapshot
+from app.panels.widgets.controls import add_dark_switch
+from app.tab.context import PageContext, SessionSnapshot
+from lessons.events import Set
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball
 
@@ -21,33 +21,32 @@ _FAR = 0.05
 
 
 class BeginPanel:
-    """The controls of the first tab, and a guide that depends on what the learner has already done.
-    `VelocityFace` sets the callbacks."""
+    """The controls of the first tab, and a guide that depends on what the learner has already done."""
 
     def __init__(
-        self,
-        page: PageContext,
-        drives: bool,
+        self, page: PageContext, drives: bool, look: Callable[[], object], add_obstacle: Callable[[], object]
     ) -> None:
-        """drives: whether the robot has a mobile base."""
+        """drives: whether the robot has a mobile base; look: turns the camera to the robot; add_obstacle:
+        puts a ball in front of the hand."""
         gui, scene = page.gui, page.ready.choice.run.scene
-        self.on_look: Callable[[], None] = lambda: None
-        self.on_obstacle: Callable[[], None] = lambda: None
-        self.on_clear: Callable[[], None] = lambda: None
-        self._colours = page.colours
-        self._dragged = False
-        self._scene, self._drives = scene, drives
+        self._page, self._scene, self._drives = page, scene, drives
         places = {level.name: place for place, level in enumerate(page.settings.levels, start=1)}
         self._guide = gui.add_html(guide(scene, drives, places, dragged=False))
         self._live = gui.add_html("")
-        swap_button = gui.add_button("Swap which comes first", hint="The first two tasks change places")
-        look = gui.add_button("Look at the robot", hint="Turns the camera to the robot's present place")
-        obstacle = gui.add_button(
-            "Put an obstacle in the way", hint="A ball in front of the hand; drag it by its arrows"
-        )
+        for label, hint, does in (
+            ("Swap which comes first", "The first two tasks change places", partial(swap, page)),
+            ("Look at the robot", "Turns the camera to the robot's present place", look),
+            (
+                "Put an obstacle in the way",
+                "A ball in front of the hand; drag it by its arrows",
+                add_obstacle,
+            ),
+        ):
+            on_click(gui.add_button(label, hint=hint), does)
         self._clear = gui.add_button(
             "Take the last ball away", hint="The obstacle that was added last", visible=False
         )
+        on_click(self._clear, self._clear_ball)
         with gui.add_folder("Show", expand_by_default=False):
             self.trace = gui.add_checkbox("Trace of the hand and the base", True)
             self.prediction = gui.add_checkbox("Predicted paths", True)
@@ -57,39 +56,25 @@ class BeginPanel:
             )
             self.arrows = gui.add_checkbox("Arrows of obstacles", True)
             self.frames = gui.add_checkbox("Target and actual frames", True)
-        self.dark = gui.add_checkbox("Dark theme", page.dark)
+        add_dark_switch(page)
 
-        on_click(swap_button, lambda: swap(page))
-        on_click(look, lambda: self.on_look())
-
-        on_click(obstacle, lambda: self.on_obstacle())
-        on_click(self._clear, lambda: self.on_clear())
-
-        @self.dark.on_update
-        async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
-            if event.client is not None:
-                page.theme(bool(self.dark.value))
-
-    def dragged(self) -> None:
-        """Called when a target is dragged: the guide then shows the next step."""
-        self._dragged = True
+    def _clear_ball(self) -> None:
+        ball = last_ball(self._page.settings)
+        if ball is not None:
+            self._page.post(Set(f"obstacles.{ball.name}", None))
 
     def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
         places = {level.name: now.number(f"level/{level.name}") for level in now.settings.levels}
-        told = guide(self._scene, self._drives, places, self._dragged)
-        if self._guide.content != told:
-            self._guide.content = told
+        self._guide.content = guide(self._scene, self._drives, places, self._page.dragged)
         lines = [self._line(now, level.name, level.tasks[0].unit) for level in now.settings.levels]
         mission = now.status.mission
         if mission is not None and mission.done:
-            lines.append(badge("MISSION DONE", self._colours[now.settings.levels[0].name]))
-        there = last_ball(now.settings) is not None
-        if self._clear.visible != there:
-            self._clear.visible = there
+            lines.append(badge("MISSION DONE", self._page.colours[now.settings.levels[0].name]))
+        self._clear.visible = last_ball(now.settings) is not None
         self._live.content = block("<br>".join(lines))
 
     def _line(self, now: SessionSnapshot[VelocitySettings], role: str, unit: str) -> str:
-        head = f"{swatch(self._colours[role])}<b>{esc(role)}</b>"
+        head = f"{swatch(self._page.colours[role])}<b>{esc(role)}</b>"
         place, error = now.number(f"level/{role}"), now.error(role)
         if place != place:
             return f"{head}: has no task now"

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import viser
 from viser import uplot
 
 from app.adapter import private
-from app.client.decimated import BUCKETS, WINDOW, PlotWindow, decimate
-from app.html.curves import round_step
+from app.client.recording import BUCKETS, WINDOW, PlotWindow, decimate
 from app.html.palette import RGB, css
+from app.html.svg import round_step
 from app.html.text import block
-from app.panels.widgets.in_view import InView
+from app.tab.context import PageContext
 
 _NUDGE = 10
 """Number of updates after which the curves are sent even if they have not changed; the time axis is then
@@ -33,6 +34,7 @@ _TIMES: uplot.Axis = {
     "splits": tuple(float(second) for second in _SECONDS),
     "values": tuple(f"{second} s".replace("-", "−") if second else "now" for second in _SECONDS),
 }
+Curves = Callable[[PlotWindow], Sequence[np.ndarray]]
 _BOUND_DASH, _GHOST_DASH = (6.0, 4.0), (3.0, 3.0)
 _PATIENCE = 12
 """Number of updates without a value after which a text explains why the chart is empty."""
@@ -57,64 +59,102 @@ class ChartLine:
         return replace(self, label=f"{self.label}, ghost", width=1.3, dash=finer)
 
 
-def of_ghost(lines: Sequence[ChartLine], ghost: bool) -> list[ChartLine]:
-    """Returns the lines of the ghost; empty if there is no ghost."""
-    return [line.of_ghost() for line in lines] if ghost else []
+@dataclass(frozen=True)
+class Plot:
+    """What a chart shows.
+
+    Attributes:
+        title: also its name for the browser.
+        span: range of the axis in the chart's unit.
+        lines: of the robot and, dashed, of its ghost.
+        curves: returns the (2 · BUCKETS,) values of each of these lines.
+        marks: bounds and marks, of the robot only; marked: returns their values.
+        log: whether the axis is logarithmic.
+        bands: areas between two lines, as (index of the upper line, index of the lower line, colour).
+        height: px; by default that with which the charts of a row begin and end together.
+        legend: whether there is a legend.
+        empty: why the chart may stay without a curve.
+        note: a text below the chart.
+    """
+
+    title: str
+    span: tuple[float, float]
+    lines: tuple[ChartLine, ...]
+    curves: Curves
+    marks: tuple[ChartLine, ...] = ()
+    marked: Curves = field(default=lambda _: ())
+    log: bool = True
+    bands: tuple[tuple[int, int, RGB], ...] = ()
+    height: int = 184
+    legend: bool = True
+    empty: str = NO_TICK
+    note: str = ""
+
+
+class Charts:
+    """Charts in a folder. They are built anew when their titles or lines change, or when a ghost starts or
+    ends."""
+
+    def __init__(self, page: PageContext, folder: viser.GuiFolderHandle | None = None) -> None:
+        """folder: where the charts are; None: here."""
+        self._page, self._folder = page, folder or page.gui.add_folder(None)
+        self._charts: list[Chart] = []
+        self._built: object = None
+
+    def draw(self, plots: Sequence[Plot], window: PlotWindow, ghost: PlotWindow | None) -> None:
+        """Draws the curves of the window. ghost: the ghost's data over the same interval."""
+        built = ghost is not None, [(plot.title, plot.lines, plot.marks) for plot in plots]
+        if built != self._built:
+            self._built = built
+            self._build(plots, ghost is not None)
+        for chart, plot in zip(self._charts, plots, strict=True):
+            chart.show(window, partial(self._curves, plot, window, ghost))
+
+    @staticmethod
+    def _curves(plot: Plot, window: PlotWindow, ghost: PlotWindow | None) -> list[np.ndarray]:
+        return [*plot.curves(window), *plot.marked(window), *(() if ghost is None else plot.curves(ghost))]
+
+    def _build(self, plots: Sequence[Plot], ghost: bool) -> None:
+        for chart in self._charts:
+            chart.remove()
+        with self._folder:
+            self._charts = [Chart(self._page, plot, ghost) for plot in plots]
 
 
 class Chart:
-    """A uPlot chart with a fixed range of values, linear or logarithmic."""
+    """A uPlot chart with a fixed range of values, linear or logarithmic. ghost: whether it also has the lines
+    of a ghost, after all others."""
 
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        in_view: InView,
-        title: str,
-        lines: Sequence[ChartLine],
-        span: tuple[float, float],
-        height: int,
-        log: bool = False,
-        bands: Sequence[tuple[int, int, RGB]] = (),
-        legend: bool = True,
-        empty: str = NO_TICK,
-    ) -> None:
-        """span: range of the axis in the chart's unit; log: whether the axis is logarithmic; the ends of
-        `span` are then powers of ten; bands: areas between two lines, as (index of the upper line, index of
-        the lower line, colour); empty: why the chart may stay without a curve."""
-        self._log = log
-        if log:
-            # The logarithmic scale of uPlot would draw nine grid lines per decade.
-            span = (math.log10(span[0]), math.log10(span[1]))
-        self._span = span
-        self._title, self._in_view = title, in_view
+    def __init__(self, page: PageContext, plot: Plot, ghost: bool) -> None:
+        lines = (*plot.lines, *plot.marks, *(line.of_ghost() for line in plot.lines if ghost))
+        self._log, self._title, self._in_view = plot.log, plot.title, page.in_view
+        # The logarithmic scale of uPlot would draw nine grid lines per decade.
+        low, high = map(math.log10, plot.span) if plot.log else plot.span
+        self._span = low, high
         self._measured = [not (line.dashed or line.fill) for line in lines]
-        self._tolerance = _FINE * _TOP / (height - _AROUND)
+        self._tolerance = _FINE * _TOP / (plot.height - _AROUND)
         self._shows = self._blank = 0
         self._sent: tuple[np.ndarray, np.ndarray] | None = None
         x = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
         scale: uplot.Scale = {"range": (0.0, _TOP), "auto": False}
-        self._handle = gui.add_uplot(
+        self._handle = page.gui.add_uplot(
             (x, *(np.zeros_like(x) for _ in lines)),
             ({"label": "s"}, *(_series(line) for line in lines)),
-            title=title,
+            title=plot.title,
             scales={"x": {"time": False}, "y": scale},
-            axes=(_TIMES, _axis(span, log)),
+            axes=(_TIMES, _axis(self._span, plot.log)),
             bands=tuple(
                 {"series": (upper + 1, lower + 1), "fill": css(colour, 0.10)}
-                for upper, lower, colour in bands
+                for upper, lower, colour in plot.bands
             )
             or None,
-            legend={"show": legend, "live": False},
+            legend={"show": plot.legend, "live": False},
             cursor={"drag": {"x": False, "y": False}},
-            height=height,
+            height=plot.height,
             padding=(6, 12, 0, 0),
         )
-        self._note = gui.add_html(block(empty), visible=False)
-
-    @property
-    def in_view(self) -> bool:
-        """Whether the browser shows the chart."""
-        return self._in_view.sees(self._title)
+        self._note = page.gui.add_html(block(plot.empty), visible=False)
+        self._below = page.gui.add_html(block(plot.note)) if plot.note else None
 
     def show(self, window: PlotWindow, curves: Callable[[], Sequence[np.ndarray]]) -> None:
         """Shows the window. curves: returns the (2 · BUCKETS,) values of each line; called only while the
@@ -124,7 +164,7 @@ class Chart:
         of a curve. There, a linear curve is constant, since a jump would look like a motion; a logarithmic
         curve lies on the axis. The chart counts as empty if only bounds and marks have values.
         """
-        if not self.in_view:
+        if not self._in_view.sees(self._title):
             return
         values = np.array(curves())
         known = np.isfinite(values)
@@ -159,17 +199,17 @@ class Chart:
     def _explain(self, blank: bool) -> None:
         """Shows a text below a chart that stays empty."""
         self._blank = self._blank + 1 if blank else 0
-        if self._note.visible != (self._blank >= _PATIENCE):
-            self._note.visible = not self._note.visible
+        self._note.visible = self._blank >= _PATIENCE
+
+    def remove(self) -> None:
+        for handle in (self._handle, self._note, self._below):
+            if handle is not None:
+                handle.remove()
 
     def _looks_the_same(self, kept: np.ndarray, values: np.ndarray) -> bool:
         if self._sent is None or not np.array_equal(kept, self._sent[0]):
             return False
         return bool(np.abs(values - self._sent[1]).max() <= self._tolerance)
-
-    def remove(self) -> None:
-        self._handle.remove()
-        self._note.remove()
 
 
 def _axis(span: tuple[float, float], log: bool) -> uplot.Axis:

@@ -14,7 +14,9 @@ from app.adapter.names import NUMBER_BOX, ROW, SLIDER_LABEL
 from app.adapter.private import dom_id
 from app.html.palette import AXES, css, ink
 from app.html.text import figure
-from app.panels.widgets.mirror import Bindings, scalar
+from app.panels.widgets.command import on_change
+from app.tab.context import PageContext
+from app.tab.mirror import Bindings, scalar
 from lessons.events import Set
 from lessons.settings.schema import Setting
 from lessons.settings.settings import SceneSettings
@@ -71,7 +73,6 @@ class Controls(Generic[S]):
         self._gui, self._bindings, self._settings = gui, bindings, settings
 
     def add(self, *paths: str) -> None:
-        """Adds a control for each path."""
         for path in paths:
             self.add_as(self._settings.setting(path))
 
@@ -208,8 +209,7 @@ class Controls(Generic[S]):
 
         def follow(settings: S) -> int:
             value = scalar(read(settings))
-            if slider.label != label(value):
-                slider.label = label(value)
+            slider.label = label(value)
             return place_of(value, low, high)
 
         self._bindings.bind(slider, follow, lambda place: Set(setting.path, value_at(place, low, high)))
@@ -227,6 +227,13 @@ class Controls(Generic[S]):
                 step=shown.step or _tenth(value),
             )
         self._bindings.bind(number, lambda s: float(read(s)), lambda given: Set(setting.path, float(given)))
+
+
+def add_dark_switch(page: PageContext) -> None:
+    """Adds the checkbox of the page's theme."""
+    dark = page.gui.add_checkbox("Dark theme", page.dark)
+
+    on_change(dark, lambda: page.theme(bool(dark.value)))
 
 
 def add_control(

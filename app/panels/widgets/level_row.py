@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import viser
 
 from app.adapter.names import ROW
 from app.adapter.private import dom_id
-from app.html.palette import BAD, RGB, css
+from app.html.palette import BAD, BOUND, css
 from app.html.text import badge, bar, esc, quantity
 from app.panels.widgets.command import on_click
+from app.tab.context import PageContext
+from himpc.stack import Level
 
 ON, OFF, UP, DOWN, MORE = "on", "off", "▲", "▼", "⋯"
 _LEAST = 1e-5
@@ -28,47 +31,62 @@ _STYLE = (
 _CUT = "min-width:0;overflow:hidden;text-overflow:ellipsis"
 
 
+class _Drawn(NamedTuple):
+    """One drawing of a row. room: width of its buttons, em."""
+
+    folder: viser.GuiFolderHandle
+    text: viser.GuiHtmlHandle
+    buttons: viser.GuiButtonGroupHandle
+    room: float
+
+
 class LevelRow:
-    """The row of one level. `details` is the folder of its settings; over the scene a row has none."""
+    """The row of one level. `details` is the folder of its settings. Over the scene the row is drawn once
+    more, without settings."""
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        name: str,
-        colour: RGB,
-        buttons: Sequence[str],
-        hint: str,
+        page: PageContext,
+        level: Level,
+        place: int,
+        others: tuple[str, ...],
+        hints: tuple[str, str],
         press: Callable[[str], None],
-        opened: bool | None = False,
+        strip: viser.GuiTabHandle | viser.GuiFolderHandle | None,
+        opened: bool = False,
     ) -> None:
-        """buttons: without the last one, which opens the settings; press: called with the button that was
-        pressed; opened: whether the settings are open, or None for a row without settings."""
-        buttons = (*buttons, MORE) if opened is not None else tuple(buttons)
-        self._colour, self._others = colour, buttons[1:]
-        self._folder = gui.add_folder(None)
-        with self._folder:
-            self._text = gui.add_html("")
-            self._buttons = gui.add_button_group(
-                name if opened is None else f"Level {name}", buttons, hint=hint
-            )
-            row = f'{ROW}:has(> * > * > label[for="{dom_id(self._buttons)}"])'
-            gui.add_html(_STYLE.format(row, _EACH * len(buttons), ROW))
-            if opened is not None:
-                self.details = gui.add_folder(f"Settings of {name}", visible=opened)
-        self._room = _EACH * len(buttons) + 1.5
+        """place: the index of the level, 0 being the highest priority; others: the buttons beside that for on
+        and off; hints: of the buttons, over the scene and in the tab; press: called with the button that was
+        pressed; strip: the place over the scene; opened: whether the settings are open."""
+        self._gui, self.name, self._others = page.gui, level.name, others
+        self._colour = page.colours.get(level.name, BOUND)
+        first = (ON if level.enabled else OFF, *others)
+        self._drawn = [self._draw(f"Level {self.name}", (*first, MORE), hints[1], press)]
+        with self._drawn[0].folder:
+            self.details = page.gui.add_folder(f"Settings of {self.name}", visible=opened)
+        if strip is not None:
+            with strip:
+                self._drawn.append(self._draw(self.name, first, hints[0], press))
+        self.update(place, level.enabled)
+
+    def _draw(self, label: str, names: tuple[str, ...], hint: str, press: Callable[[str], None]) -> _Drawn:
+        with self._gui.add_folder(None) as folder:
+            text = self._gui.add_html("")
+            buttons = self._gui.add_button_group(label, names, hint=hint)
+            row = f'{ROW}:has(> * > * > label[for="{dom_id(buttons)}"])'
+            self._gui.add_html(_STYLE.format(row, _EACH * len(names), ROW))
 
         def pressed() -> None:
-            button = str(self._buttons.value)
-            if button == MORE:
+            if buttons.value == MORE:
                 self.details.visible = not self.details.visible
-            press(button)
+            press(str(buttons.value))
 
-        on_click(self._buttons, pressed)
+        on_click(buttons, pressed)
+        return _Drawn(folder, text, buttons, _EACH * len(names) + 1.5)
 
     def update(
         self,
         place: int,
-        title: str,
         on: bool,
         error: float = 0.0,
         error_words: str = "",
@@ -79,30 +97,29 @@ class LevelRow:
         """Updates the row. Before the first control step there is neither an error nor a freedom.
 
         Args:
-            place: the index of the level, 0 being the highest priority.
-            title: its number and name.
-            on: whether it is switched on.
+            place: as for the constructor.
+            on: whether the level is switched on.
             error, error_words: its error, m or rad, and the same in words.
             free: its freedom, in few words.
             about: an explanation of its freedom.
             fault: the fallback that was applied; "" for none.
         """
-        if self._folder.order != float(place):
-            self._folder.order = float(place)
-        buttons = (ON if on else OFF, *self._others)
-        if self._buttons.options != buttons:
-            self._buttons.options = buttons
+        title = esc(f"{place + 1} · {self.name}")
         share = math.log10(error / _LEAST) / -math.log10(_LEAST) if error > _LEAST else 0.0
         note = badge(fault, BAD) if fault else f'<span title="{esc(about)}">{esc(free)}</span>'
         line = "display:flex;justify-content:space-between;gap:0.6em;align-items:center;white-space:nowrap"
-        self._text.content = (
-            f'<div style="font-size:0.85em;line-height:1.35;height:2.8em;margin:0.2em 0 0.25em 0.75em;'
-            f"padding:0 {self._room / 0.85:.1f}em 0 0.5em;border-left:5px solid {css(self._colour)};"
-            f'overflow:hidden"><div style="{line}"><b style="{_CUT}" title="{esc(title)}">{esc(title)}</b>'
-            f"<span>{error_words}</span></div>"
-            f'<div style="{line}"><div style="flex:1">{bar(share if on else 0.0, self._colour)}</div>'
-            f"{note}</div></div>"
-        )
+        for folder, text, buttons, room in self._drawn:
+            folder.order = float(place)
+            names = (ON if on else OFF, *self._others, *buttons.options[1 + len(self._others) :])
+            buttons.options = names
+            text.content = (
+                f'<div style="font-size:0.85em;line-height:1.35;height:2.8em;margin:0.2em 0 0.25em 0.75em;'
+                f"padding:0 {room / 0.85:.1f}em 0 0.5em;border-left:5px solid {css(self._colour)};"
+                f'overflow:hidden"><div style="{line}"><b style="{_CUT}" title="{title}">{title}</b>'
+                f"<span>{error_words}</span></div>"
+                f'<div style="{line}"><div style="flex:1">{bar(share if on else 0.0, self._colour)}</div>'
+                f"{note}</div></div>"
+            )
 
 
 def error_in_words(errors: Sequence[tuple[str, float, str]]) -> str:

@@ -9,8 +9,9 @@ from collections.abc import Sequence
 import viser
 
 from app.adapter import private
+from app.html.svg import element, picture, text
 from app.html.text import esc
-from app.panels.widgets.in_view import InView
+from app.tab.in_view import InView
 
 _EVERY = 0.15  # s between two updates: a moving picture needs several kilobytes per second
 _AGAIN = 15
@@ -41,12 +42,12 @@ class SvgPicture:
         self._client, self._in_view, self.title = client, in_view, title
         width, height = size
         private.run_script(client, _PAINT)
-        words = f'<text x="{width / 2:g}" y="{height / 2:g}" text-anchor="middle">{esc(empty)}</text>'
+        live = element("g", text(width / 2, height / 2, empty, "middle"), class_="live")
+        drawn = picture(
+            width, height, title, live, "display:block;max-width:42em;margin:auto;fill:currentColor"
+        )
         self._handle = client.gui.add_html(
-            f'<div data-chart="{esc(title)}" style="padding:0.2em 0.5em">'
-            f'<svg viewBox="0 0 {width} {height}" width="100%" role="img" aria-label="{esc(title)}" '
-            'style="display:block;max-width:42em;margin:auto" font-size="11" font-family="inherit" '
-            f'fill="currentColor"><g class="live">{words}</g></svg></div>'
+            f'<div data-chart="{esc(title)}" style="padding:0.2em 0.5em">{drawn}</div>'
         )
         self._painted: list[str] = []
         self._looks = 0

@@ -13,8 +13,8 @@ from served import served
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.web.classroom import STEERING, Classroom
-from app.web.server import PageServer
+from app.web.server import PageServer, ServerOptions
+from app.web.sessions import STEERING, Classroom
 from browsing.browser_actions import open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 
@@ -121,7 +121,7 @@ def test_pages_of_a_class_that_has_ended_say_so(browser: Browser) -> None:
 
     def started(port: int) -> PageServer:
         choice = SceneChoice(RunSpec("planar3-hold"))
-        return PageServer(choice, port=port, classroom=True, class_names=True)
+        return PageServer(choice, ServerOptions(port=port, classroom=True, class_names=True))
 
     first = started(0)
     assert first.hall is not None

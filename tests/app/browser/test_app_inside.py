@@ -12,11 +12,10 @@ from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.inside import InsideRequest
-from app.link.messages import Play, Post
+from app.link.messages import InsideRequest, Play, Post
+from app.panels.inside.matrix import EIGENVALUES as SPECTRUM
 from app.panels.inside.matrix import TITLE as HESSIAN
 from app.panels.inside.plane import TITLE as PLANE
-from app.panels.inside.spectrum import TITLE as SPECTRUM
 from app.web.server import PageServer
 from browsing.browser_actions import drag_target, eventually, often, open_page, press, set_number, tab, unfold
 from browsing.scene_switch import show_scene

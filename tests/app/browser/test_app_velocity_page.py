@@ -11,8 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 from served import served
 
 from app.client.simulation_client import SimulationClient
-from app.link.messages import Post
-from app.link.mission_view import MissionView
+from app.link.messages import MissionView, Post
 from app.web.server import PageServer
 from browsing.browser_actions import (
     drag_target,

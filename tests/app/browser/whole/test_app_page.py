@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.adapter import private
-from app.adapter.thread_safe_event import ThreadSafeEvent
+from app.adapter.private import ThreadSafeEvent
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load
@@ -229,7 +229,7 @@ def test_the_browser_tells_which_charts_it_shows(
     (shown,) = (each for each in pages if each.learner is learner)
 
     def sees(title: str) -> bool:
-        return shown._stage is not None and shown._stage.page.in_view.sees(title)
+        return shown._scene is not None and shown._scene.page.in_view.sees(title)
 
     for name, seen, unseen in (
         ("Joints", "Torque, % of bound", "Joint nearest its bound, %"),

@@ -1,0 +1,1 @@
+"""What the panels and the 3D view of one browser tab share."""
