@@ -13,7 +13,7 @@ from app.html.markdown import rendered_line
 from app.html.text import esc, figure
 from app.link.exercise import LessonPlace, parts_of
 from lessons.course import COURSE
-from lessons.exercises.folder import cell
+from lessons.exercises.cells import cell
 from lessons.teaching.lesson import Challenge
 from lessons.teaching.poll import histogram
 from lessons.teaching.prediction import Choice, Sketch, Value

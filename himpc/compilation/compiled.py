@@ -43,3 +43,8 @@ for targets other than this processor."""
 kept = chain.kept
 """(function, key, make): returns bytes that depend on the function's sources. They are read from disk if an
 earlier call has made them."""
+
+
+def plain(function: Any) -> Any:
+    """Returns the Python function of a kernel, to compile it in another way as well."""
+    return getattr(function, "py_func", function)

@@ -34,7 +34,7 @@ class Settings:
 
     stack: Stack
     # fmt: off
-    M_bar: Annotated[tuple[float, ...], Range(1e-12, 1e6), Shown(
+    M_bar: Annotated[tuple[float, ...], Range(1e-12, 1e12), Shown(
         "M̄", "The diagonal of M̄, one number per joint, before scaling", "kg·m²")]
     M_bar_adapt: Annotated[bool, Shown(
         "M̄ adapts to the payload", "The controller estimates the payload from the torque against gravity, "

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+from lessons.exercises.cells import cell, of_cell
 from lessons.exercises.grade import WITHIN, Submission, grade_apart
 from lessons.exercises.result import Grade
 from lessons.outputs import write_files
@@ -17,23 +17,6 @@ from lessons.own.files import SUFFIX, Source, fingerprint, is_file, read
 from lessons.parallel import FailedJob, Spread
 from robots import InputError
 from robots.processes.isolation import Allowance
-
-_RISKY = r"""[\s']*[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20]"""
-_BEGINS = re.compile(rf"(^|[;|\t\r\n])(?={_RISKY})")
-_MARKED = re.compile(rf"(^|[;|\t\r\n])'(?={_RISKY})")
-"""Beginnings that a spreadsheet would interpret as a formula, in half or full width; also after a separator
-at which the spreadsheets of some countries split a cell."""
-
-
-def cell(text: str) -> str:
-    """Returns the content of a cell that shows this text, with an apostrophe before each formula."""
-    return _BEGINS.sub(r"\1'", text)
-
-
-def of_cell(text: str) -> str:
-    """Returns the text from which `cell` has made this cell."""
-    return _MARKED.sub(r"\1", text)
-
 
 COLUMNS: tuple[str, ...] = (
     *("file", "exercise", "points", "of", "missed", "error", "seed", "asked", "sha256", "protection"),

@@ -359,7 +359,7 @@ def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command also accepts several proxies."""
     asked: dict[str, Any] = {}
-    monkeypatch.setattr("app.web.server.PageServer", lambda _, **options: asked.update(options))
+    monkeypatch.setattr("app.web.server.PageServer", lambda _, options: asked.update(vars(options)))
     monkeypatch.setattr("app.web.serving.serve", lambda _, **options: 0)
     first, second = "https://lab.example.org", "https://b.example.org"
     assert main(["--no-browser", "--trusted-origin", first, "--trusted-origin", second]) == 0

@@ -18,7 +18,8 @@ from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
 from himpc.controllers.view import Bounds, Further, LevelView, NearView, View
 from lessons.exercises.apart import Apart, Exhausted, Refused
-from lessons.exercises.folder import cell, grade_folder, of_cell
+from lessons.exercises.cells import cell, of_cell
+from lessons.exercises.folder import grade_folder
 from lessons.exercises.grade import Submission, grade_apart
 from lessons.exercises.inside import now as told
 from lessons.exercises.inside.now import rebuilt, shape_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import inline_kernel
+from himpc.compilation.compiled import inline_kernel, plain
 from himpc.export.kernel.rows import constraints_of, joint_rows
 from himpc.htmpc.kernel.active_set import solve as solve_qp
 from himpc.limits.apart import FAINT
@@ -12,7 +12,7 @@ from himpc.tick.kernel.arrays import Array, TickArrays
 from himpc.tick.kernel.bounds import constraint_values
 from himpc.tick.kernel.pair_arrays import PairArrays
 
-_solve = inline_kernel(solve_qp.py_func)
+_solve = inline_kernel(plain(solve_qp))
 
 
 @inline_kernel

@@ -17,6 +17,7 @@ from himpc.compilation.compiled import (
     VECTOR,
     inline_kernel,
     kernel,
+    plain,
 )
 from himpc.compilation.views import borrowed
 from himpc.tick.kernel.kinematics import add, points
@@ -280,5 +281,5 @@ near = kernel(
     *(MATRICES, MATRICES, INDICES, INDICES, VECTOR, MATRIX, INDICES, MATRIX, MATRIX, VECTOR),
     *(INDICES, INDICES, MATRICES, MATRIX, MATRIX, VECTOR, TABLE, NUMBER),
     *(MATRICES, MATRICES, INDICES, INDICES, INDICES, VECTOR, VECTOR, MATRIX, MATRIX),
-)(find_near.py_func)
+)(plain(find_near))
 """`find_near` for callers in Python."""

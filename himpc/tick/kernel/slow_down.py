@@ -18,7 +18,16 @@ is near, or its first task is disturbed.
 
 from __future__ import annotations
 
-from himpc.compilation.compiled import FLAG, GIVEN_VECTOR, MATRIX, NUMBER, VECTOR, inline_kernel, kernel
+from himpc.compilation.compiled import (
+    FLAG,
+    GIVEN_VECTOR,
+    MATRIX,
+    NUMBER,
+    VECTOR,
+    inline_kernel,
+    kernel,
+    plain,
+)
 from himpc.constants import (
     BLOCKED,
     CLOSE_ENOUGH,
@@ -134,5 +143,5 @@ def lower_velocities(
 slow_down = kernel(
     *(VECTOR, VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, MATRIX, NUMBER, FLAG, NUMBER),
     *(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR),
-)(lower_velocities.py_func)
+)(plain(lower_velocities))
 """`lower_velocities` for callers in Python."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import FLAG, GIVEN_VECTOR, NUMBER, VECTOR, inline_kernel, kernel
+from himpc.compilation.compiled import FLAG, GIVEN_VECTOR, NUMBER, VECTOR, inline_kernel, kernel, plain
 from himpc.tick.kernel.arrays import Array
 
 PRESSING = 0.5
@@ -101,5 +101,5 @@ def resist_windup(
 
 resist_windup_of = kernel(
     *(VECTOR, VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, FLAG, NUMBER, VECTOR, VECTOR, VECTOR, VECTOR)
-)(resist_windup.py_func)
+)(plain(resist_windup))
 """`resist_windup` for callers in Python."""
