@@ -4,6 +4,7 @@ restarted."""
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,6 +23,7 @@ from browsing.wire import Wire, eventually
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.prediction import Choice
+from tests.robots.arms import joint, link, two_joint_arm
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
@@ -110,3 +112,12 @@ def test_a_page_that_fails_says_so_and_can_be_started_again(
         learner = server.sessions.learners[0]
         assert isinstance(learner, SimulationClient) and learner.failure is None
     assert "no <place> for it" in capfd.readouterr().err  # the log shows the place of the error
+
+
+def test_a_robot_whose_tip_has_the_name_of_a_joint_is_shown(tmp_path: Path) -> None:
+    """The joint that ends a small arm, and the link behind it, are often both named after the gripper."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(two_joint_arm(link("gripper") + joint("gripper", "l2", "gripper", "fixed", "")))
+    choice = SceneChoice(RunSpec("hold", urdf=str(file), tip="gripper"))
+    with served(choice) as server, Wire(server.link) as page:
+        assert eventually(lambda: page.shows("Running"))

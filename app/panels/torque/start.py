@@ -134,7 +134,7 @@ class StartPanel:
         with gui.add_folder("Push the robot"):
             robot, names = ready.robot, ready.robot.joint_names
             self._kg = sensible_payload(
-                robot.model, robot.model.getFrameId(robot.tip), robot.home, robot.tau_limit, _LARGEST_LOAD
+                robot.model, robot.frame_id(robot.tip), robot.home, robot.tau_limit, _LARGEST_LOAD
             )
             self._pick_up = f"Pick up {f'{self._kg:g} kg' if self._kg >= 1.0 else f'{1e3 * self._kg:g} g'}"
             step = float(f"{_PUSH_PER_KG * self._kg / 6.0:.1g}")
