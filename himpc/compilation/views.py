@@ -4,7 +4,7 @@ owns."""
 from __future__ import annotations
 
 import linecache
-from typing import Any
+from typing import Any, get_type_hints
 
 from himpc.compilation import public_only
 
@@ -30,6 +30,19 @@ def view(memory: str, start: str, shape: str) -> str:
     s contains the values of the letters."""
     sizes = [size if size.isdecimal() else f"s.{size}" for size in shape.split()]
     return f"{_VIEW[len(sizes)]}({memory}, {start}, {', '.join(sizes)})"
+
+
+def shapes_of(table: type, kind: Any) -> dict[str, str]:
+    """Returns the shapes of a table's arrays of one kind, by name. Each annotation of the table is
+    Annotated[kind, shape, …]."""
+    hints = get_type_hints(table, include_extras=True)
+    return {name: hint.__metadata__[0] for name, hint in hints.items() if hint.__origin__ == kind}
+
+
+def views(memory: str, where: str, shapes: dict[str, str]) -> str:
+    """Returns the text of the views of all arrays in a memory, separated by commas. `where` is the name of
+    the array with the index at which each array begins, in the order of the shapes."""
+    return ", ".join(view(memory, f"{where}[{index}]", shape) for index, shape in enumerate(shapes.values()))
 
 
 def as_function(name: str, module: str, text: str, **names: Any) -> Any:

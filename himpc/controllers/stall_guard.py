@@ -14,7 +14,7 @@ from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce
 from himpc.tick.distances import Anywhere, Distances, carried
 from himpc.tick.kernel.slow_down import slow_down
-from himpc.tick.kernel.windup import resist_windup_of, taken_back
+from himpc.tick.kernel.windup import resist_windup_of
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ class WindupGuard:
     def __init__(self, stall: StallGuard, robot: Robot, M_bar: Array, margin: float, T_s: float) -> None:
         """stall: the guard for an obstacle that is near. M_bar: (n,) kg·m². margin: see `Avoidance`."""
         self._stall, self._around, self._T_s = stall, Anywhere(carried(robot), margin), T_s
-        self._v_limit, self._largest = np.array(robot.v_limit), taken_back(M_bar, robot.v_limit, T_s)
+        self._v_limit, self._M_bar = np.array(robot.v_limit), M_bar
         self._tau: Array | None = None
         self._wound, self._windup = np.zeros(robot.n), np.array((0.0, 1.0))
         self.largest_error = stall.largest_error
@@ -109,7 +109,7 @@ class WindupGuard:
             self._tau = np.array(tau)
         slowed = self._stall.limits(limits, tau, v, self._around)
         pressing = resist_windup_of(
-            *(self._largest, self._v_limit, tau, v, self.fastest > PROGRESS, self._T_s),
+            *(self._M_bar, self._v_limit, tau, v, self.fastest > PROGRESS, self._T_s),
             *(self._tau, self._wound, self._windup, slowed.v_limit),
         )
         self.largest_error = min(self._stall.largest_error, pressing)

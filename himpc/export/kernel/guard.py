@@ -23,8 +23,9 @@ from himpc.tick.kernel.arrays import PULL, T_S, TickArrays
 from himpc.tick.kernel.cascade import FIRST, LAST
 from himpc.tick.kernel.distance_rows import FASTEST as FASTEST_OBJECT
 from himpc.tick.kernel.distance_rows import ROOM
-from himpc.tick.kernel.linear import copy, dot
+from himpc.tick.kernel.linear import copy
 from himpc.tick.kernel.pair_arrays import PairArrays
+from himpc.tick.kernel.progress import error_length, fastest_reference
 from himpc.tick.kernel.slow_down import lower_velocities
 from himpc.tick.kernel.windup import resist_windup
 
@@ -51,7 +52,6 @@ def guard(t: TickArrays, p: LoopArrays, d: PairArrays) -> None:
     for a in range(n):
         p.free_limit[a] = (1.0 - p.setup[MARGIN]) * p.v_ramped[a]
         p.largest_torque[a] = max(t.limits[1, a], -t.limits[0, a])
-        p.pressing[a] = t.M_bar[a] * p.v_limit[a] / T_s
     moves = p.state[FASTEST] > PROGRESS
     room = d.about[ROOM] if kind == STALL else 0.0
     close = moves or (kind == STALL and d.about[FASTEST_OBJECT] > PROGRESS)
@@ -63,7 +63,7 @@ def guard(t: TickArrays, p: LoopArrays, d: PairArrays) -> None:
     t.scalars[PULL] = p.setup[LARGEST_ERROR]
     if kind != STALL:
         largest = resist_windup(
-            *(p.pressing, p.v_limit, t.tau_0, t.v, moves, T_s, p.tau_before, p.wound, p.windup, t.limits[2])
+            *(t.M_bar, p.v_limit, t.tau_0, t.v, moves, T_s, p.tau_before, p.wound, p.windup, t.limits[2])
         )
         t.scalars[PULL] = min(t.scalars[PULL], largest)
 
@@ -71,7 +71,7 @@ def guard(t: TickArrays, p: LoopArrays, d: PairArrays) -> None:
 @inline_kernel
 def remember_errors(t: TickArrays, p: LoopArrays) -> None:
     """Stores the errors of the tasks that are solved, those of the highest level first, and the largest
-    velocity of a reference; see `himpc.tick.kernel.progress`."""
+    velocity of a reference."""
     count = 0
     for at in range(int(p.setup[LEVELS])):
         i = int(p.order[at])
@@ -80,9 +80,6 @@ def remember_errors(t: TickArrays, p: LoopArrays) -> None:
         for task in range(len(t.task)):
             first, size = t.task[task, 2], t.task[task, 3]
             if p.table[i, FIRST] <= first < p.table[i, LAST]:
-                p.errors[count] = math.sqrt(dot(t.error[first:], t.error[first:], size))
+                p.errors[count] = error_length(t, first, first + size)
                 count += 1
-    fastest = 0.0
-    for i in range(t.motion.shape[2]):
-        fastest = max(fastest, abs(t.motion[1, 0, i]))
-    p.state[ERRORS], p.state[FASTEST] = float(count), fastest
+    p.state[ERRORS], p.state[FASTEST] = float(count), fastest_reference(t)

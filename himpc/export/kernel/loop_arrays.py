@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Callable
-from typing import Annotated, NamedTuple, get_type_hints
+from typing import Annotated, NamedTuple
 
 from himpc.compilation.compiled import always_inline_kernel
-from himpc.compilation.views import as_function, view
+from himpc.compilation.views import as_function, shapes_of, views
 from himpc.tick.kernel.arrays import Array, IntArray, TickArrays
 
 
@@ -53,7 +53,6 @@ class LoopArrays(NamedTuple):
     # Scratch.
     free_limit: Annotated[Array, "n", "rad/s", "velocity limits less the margin of a guarded robot"]
     largest_torque: Annotated[Array, "n", "N·m", "the larger torque limit in force"]
-    pressing: Annotated[Array, "n", "N·m", "the largest torque with which a joint may press"]
     lowest: Annotated[Array, "b n", "N·m", "lower bounds before a fallback has widened them"]
     highest: Annotated[Array, "b n", "N·m", "upper bounds before a fallback has widened them"]
     size: Annotated[Array, "b n", "N·m", "sum of the magnitudes of each row's terms"]
@@ -73,9 +72,7 @@ class LoopArrays(NamedTuple):
     ]
 
 
-SHAPES: dict[str, str] = {
-    name: hint.__metadata__[0] for name, hint in get_type_hints(LoopArrays, include_extras=True).items()
-}
+SHAPES = shapes_of(LoopArrays, Array)
 """The shape of every array by name, in the order of the arrays."""
 
 MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE, GUARD, MARGIN, LARGEST_ERROR = range(10)
@@ -100,7 +97,6 @@ def sizes_of(n: int, N: int, M: int, r: int, T: int, b: int) -> LoopSizes:
     return LoopSizes(n, N, N + 1, M, r, T, b, 1 << r, max(9, widest), max(19, 4 * widest + 1), 3 + 3 * widest)
 
 
-_VIEWS = (view("loop", f"where[{index}]", shape) for index, shape in enumerate(SHAPES.values()))
 loop_arrays_of: Callable[[Array, IntArray, TickArrays], LoopArrays] = always_inline_kernel(
     as_function(
         "loop_arrays_of",
@@ -109,7 +105,7 @@ loop_arrays_of: Callable[[Array, IntArray, TickArrays], LoopArrays] = always_inl
 def loop_arrays_of(loop, where, t):
     N, n = t.fixed.shape
     s = sizes_of(n, N, t.sizes[2], int(loop[where[0] + LEVELS]), len(t.task), len(t.L))
-    return LoopArrays({", ".join(_VIEWS)})
+    return LoopArrays({views("loop", "where", SHAPES)})
 """,
         LoopArrays=LoopArrays,
         LEVELS=LEVELS,

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple, get_type_hints
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.compilation.compiled import always_inline_kernel
-from himpc.compilation.views import as_function, view
+from himpc.compilation.views import as_function, shapes_of, view, views
 
 Array = NDArray[np.float64]
 IntArray = Any
@@ -218,13 +218,7 @@ class TickArrays(NamedTuple):
     stamp: Annotated[IntArray, "2", "s, ns", "control_period → itself"]
 
 
-def _shapes(kind: Any) -> dict[str, str]:
-    """Returns the shapes of all arrays of a kind."""
-    hints = get_type_hints(TickArrays, include_extras=True)
-    return {name: hint.__metadata__[0] for name, hint in hints.items() if hint.__origin__ == kind}
-
-
-NUMBERS, WHOLES = _shapes(Array), _shapes(IntArray)
+NUMBERS, WHOLES = shapes_of(TickArrays, Array), shapes_of(TickArrays, IntArray)
 """The shape of every array, by name: arrays of real numbers, and arrays of whole numbers."""
 AT, WHOLE_AT = ({name: index for index, name in enumerate(shapes)} for shapes in (NUMBERS, WHOLES))
 """The index of each array in `Arena.where` and in `Arena.whole_where`, by name."""
@@ -238,10 +232,6 @@ def sizes_of(s: IntArray) -> Sizes:
     return Sizes(n, N, N + 1, M, r, T, F, G, s[12], b, max(s[11], 1), w, w + 1)
 
 
-_VIEWS = (
-    *(view("data", f"where[{AT[name]}]", shape) for name, shape in NUMBERS.items()),
-    *(view("whole", f"whole_where[{WHOLE_AT[name]}]", shape) for name, shape in WHOLES.items()),
-)
 arrays_of: Callable[[Array, IntArray, IntArray, IntArray], TickArrays] = always_inline_kernel(
     as_function(
         "arrays_of",
@@ -249,7 +239,7 @@ arrays_of: Callable[[Array, IntArray, IntArray, IntArray], TickArrays] = always_
         f"""
 def arrays_of(data, where, whole, whole_where):
     s = sizes_of({view("whole", f"whole_where[{WHOLE_AT['sizes']}]", WHOLES["sizes"])})
-    return TickArrays({", ".join(_VIEWS)})
+    return TickArrays({views("data", "where", NUMBERS)}, {views("whole", "whole_where", WHOLES)})
 """,
         TickArrays=TickArrays,
         sizes_of=always_inline_kernel(sizes_of),

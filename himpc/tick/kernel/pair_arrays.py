@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Callable
-from typing import Annotated, NamedTuple, get_type_hints
+from typing import Annotated, NamedTuple
 
 from himpc.compilation.compiled import always_inline_kernel
-from himpc.compilation.views import as_function, view
+from himpc.compilation.views import as_function, shapes_of, views
 from himpc.tick.kernel.arrays import Array, IntArray
 
 
@@ -82,13 +82,7 @@ class PairArrays(NamedTuple):
     qp_watched: Annotated[IntArray, "e", "1", "scratch of the solver"]
 
 
-def _shapes(kind: object) -> dict[str, str]:
-    """Returns the shapes of all arrays of a kind."""
-    hints = get_type_hints(PairArrays, include_extras=True)
-    return {name: hint.__metadata__[0] for name, hint in hints.items() if hint.__origin__ == kind}
-
-
-PAIR_NUMBERS, PAIR_WHOLES = _shapes(Array), _shapes(IntArray)
+PAIR_NUMBERS, PAIR_WHOLES = shapes_of(PairArrays, Array), shapes_of(PairArrays, IntArray)
 """The shape of every array, by name: arrays of real numbers, and arrays of whole numbers."""
 PairSizes = namedtuple("PairSizes", "n J S O P R e e1")
 """The values of the letters in the shapes, see `PairArrays`."""
@@ -99,10 +93,6 @@ def pair_sizes(s: IntArray) -> PairSizes:
     return PairSizes(s[0], s[1], s[2], s[3], s[4], s[5], s[0] + s[5], s[0] + s[5] + 1)
 
 
-_VIEWS = (
-    *(view("data", f"where[{index}]", shape) for index, shape in enumerate(PAIR_NUMBERS.values())),
-    *(view("whole", f"whole_where[{index}]", shape) for index, shape in enumerate(PAIR_WHOLES.values())),
-)
 pair_arrays_of: Callable[[Array, IntArray, IntArray, IntArray], PairArrays] = always_inline_kernel(
     as_function(
         "pair_arrays_of",
@@ -110,7 +100,7 @@ pair_arrays_of: Callable[[Array, IntArray, IntArray, IntArray], PairArrays] = al
         f"""
 def pair_arrays_of(data, where, whole, whole_where):
     s = pair_sizes(vector(whole, whole_where[0], 6))
-    return PairArrays({", ".join(_VIEWS)})
+    return PairArrays({views("data", "where", PAIR_NUMBERS)}, {views("whole", "whole_where", PAIR_WHOLES)})
 """,
         PairArrays=PairArrays,
         pair_sizes=always_inline_kernel(pair_sizes),

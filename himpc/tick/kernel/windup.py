@@ -50,9 +50,12 @@ def taken_back(M_bar: Array, v_limit: Array, T_s: float) -> Array:
     return M_bar * v_limit / T_s
 
 
+_taken_back = inline_kernel(taken_back)
+
+
 @inline_kernel
 def resist_windup(
-    largest: Array,
+    M_bar: Array,
     v_limit: Array,
     tau: Array,
     v: Array,
@@ -67,11 +70,11 @@ def resist_windup(
     Returns the largest error on which tasks act, m or rad, see `Avoidance.pull`.
 
     Args:
-        largest: the result of `taken_back`. v_limit: of the robot, (n,) rad/s.
+        M_bar: (n,) kg·m². v_limit: of the robot, (n,) rad/s.
         tau: torque that acts, (n,) N·m. v: measured, (n,) rad/s.
         moves: whether a reference moves. T_s: control period, s.
         tau_before: (n,) N·m, the torque that acted one period ago; updated.
-        wound: (n,) change of the torque while the joints were still, as a share of `largest`; updated.
+        wound: (n,) change of the torque while the joints were still, as a share of `taken_back`; updated.
         windup: numbers about the wind-up, see TREND; updated.
         slower: (n,) rad/s, the velocity limits in force; lowered.
     """
@@ -82,7 +85,7 @@ def resist_windup(
         carried = carried or abs(v[a]) > CARRIED * v_limit[a]
     growth, most, forgotten = 0.0, 0.0, math.exp(-fastest * T_s / FORGETS)
     for a in range(n):
-        change = (tau[a] - tau_before[a]) / largest[a]
+        change = (tau[a] - tau_before[a]) / _taken_back(M_bar[a], v_limit[a], T_s)
         wound[a] = (wound[a] + change) * forgotten
         tau_before[a] = tau[a]
         growth += change * wound[a]
