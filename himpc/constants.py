@@ -52,10 +52,13 @@ INSIDE = -0.03
 """m: a pair that is nearer than d_safe by more than this must move apart, and the robot is not slowed down. A
 robot with a smaller violation counts as stalled if the violation does not decrease."""
 PROGRESS = 0.05
-"""m/s, rad/s: an error makes progress if it decreases faster than this plus PROGRESS_SHARE times the error. A
-reference that is faster than this constant counts as moving."""
+"""m/s, rad/s: an error makes progress if it decreases faster than this plus PROGRESS_SHARE times the error.
+"""
 PROGRESS_SHARE = 0.25
 """1/s: see PROGRESS. Without an obstacle, errors decrease ten times as fast as this share requires."""
+MOVING = 0.01
+"""m/s, rad/s: a reference or an object that is faster than this counts as moving. A stalled robot, whose
+joints may move at SLOWEST, follows a slower reference without being released."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05

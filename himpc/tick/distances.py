@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.constants import PROGRESS, WITHIN
+from himpc.constants import MOVING, WITHIN
 from himpc.kinematics.geometry import Geometry, geometry
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import row_count
@@ -164,7 +164,7 @@ class Distances:
     @property
     def moves(self) -> bool:
         """Whether an object with a row moves."""
-        return self._pairs is not None and bool(self._pairs.f["about"][FASTEST] > PROGRESS)
+        return self._pairs is not None and bool(self._pairs.f["about"][FASTEST] > MOVING)
 
     def observe(self, observed: Observed) -> None:
         """Stores the present placements and velocities of the objects."""

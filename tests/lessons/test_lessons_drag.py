@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from app.__main__ import main
+from himpc.controllers import stall_guard
+from lessons.events import MoveTarget
 from lessons.experiments.drag import Motion, dragged, target
 from lessons.scenes.hold import hold_robot
+from lessons.session.start import begin
 from robots import Robot, load_robot, load_urdf_text
 
 FIELD = Path(__file__).parents[1] / "robots" / "field"
@@ -105,6 +108,52 @@ def test_a_drag_does_not_end_at_a_position_limit() -> None:
     text = (FIELD / "mimic_in_chain.urdf").read_text()
     motion = dragged(load_urdf_text(text.replace('lower="-2" upper="2"', 'lower="-0.175" upper="0.175"')))
     assert motion.follows, str(motion)
+
+
+def small() -> Robot:
+    """Returns an arm of 0.4 m with four joints, near its own base. It cannot keep the orientation of its
+    hand, and a pair of links is always within 0.1 m of the distance that is kept."""
+    parts = ['<link name="l0"/>']
+    for k, (axis, at) in enumerate((("0 0 1", 0.05), ("0 1 0", 0.05), ("0 1 0", 0.12), ("0 1 0", 0.12))):
+        parts.append(
+            f'<link name="l{k + 1}"><inertial><origin xyz="0 0 0.05"/><mass value="0.15"/>'
+            '<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>'
+            '<collision><origin xyz="0 0 0.05"/><geometry><cylinder radius="0.015" length="0.06"/></geometry>'
+            f'</collision></link><joint name="j{k}" type="revolute"><parent link="l{k}"/>'
+            f'<child link="l{k + 1}"/><origin xyz="0 0 {at}"/><axis xyz="{axis}"/>'
+            '<limit lower="-2" upper="2" velocity="1" effort="35"/></joint>'
+        )
+    parts.append('<link name="tool0"/><joint name="at" type="fixed"><parent link="l4"/><child link="tool0"/>')
+    return load_urdf_text(f'<robot name="small">{"".join(parts)}<origin xyz="0 0 0.1"/></joint></robot>')
+
+
+def left_after_a_slow_drag(robot: Robot, speed: float) -> float:
+    """Drags the target as the page does, by 60 mm in steps of 40 ms; returns how far the hand is from it 2 s
+    later, m. speed: of the drag, m/s."""
+    session = begin(hold_robot(robot), 0)
+    position = session.target("position")
+    assert position is not None
+    start, way, steps = position.raw, np.array((0.0, 0.06, 0.0)), round(0.06 / speed / 0.04)
+    for step in range(1, steps + 1):
+        session.post(MoveTarget("position", tuple((start + step / steps * way).tolist())))
+        for _ in range(40):
+            session.tick()
+    for _ in range(2000):
+        session.tick()
+    return float(np.linalg.norm(session.plant.frame_pose(robot.tip)[1] - start - way))
+
+
+@pytest.mark.parametrize("speed", [0.005, 0.02, 0.04])
+def test_a_robot_follows_a_target_that_is_dragged_slowly(
+    monkeypatch: pytest.MonkeyPatch, speed: float
+) -> None:
+    """A task at a lower level cannot be fulfilled, and makes no progress. While the target moves, this does
+    not count as a stall, however slowly it moves."""
+    robot = small()
+    assert left_after_a_slow_drag(robot, speed) < 1e-4
+    if speed == 0.02:
+        monkeypatch.setattr(stall_guard, "MOVING", 0.05)
+        assert left_after_a_slow_drag(robot, speed) > 5e-3
 
 
 def test_the_verdict_says_why_a_robot_does_not_follow() -> None:
