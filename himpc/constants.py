@@ -46,6 +46,10 @@ LEAD = 0.1
 LEAST_WHILE_FASTER = 0.5
 """The velocity limit of a joint that accelerates is not reduced below this share of the full limit."""
 
+FULL_SIZE, LEAST_SIZE = 0.85, 0.02
+"""m and 1: the length of a robot for which the lengths below are given, and the smallest share of it that is
+assumed. For a shorter robot BLOCKED, and PROGRESS, CLOSE_ENOUGH and DISTURBED of positions, are shorter in
+proportion."""
 BLOCKED = 0.1
 """m: a robot counts as stalled only if the distance of a pair exceeds d_safe by less than this."""
 INSIDE = -0.03

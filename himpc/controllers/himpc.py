@@ -124,7 +124,7 @@ class HIMPC(TorqueController):
         if plan is None:
             return self._hold(q, started)
         if self._guard is not None:
-            self._guard.errors, self._guard.fastest = self.kernel.progress()
+            self._guard.errors, self._guard.fastest = self.kernel.progress(self._guard.size)
         self._tau_0 = plan.tau
         return plan
 

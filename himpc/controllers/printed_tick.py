@@ -44,7 +44,7 @@ class PrintedTick:
         self._shares: list[float | Array] = [1.0] * len(prepared.form.levels)
         self._pull = settings.limits.avoidance.largest_error
         self._problems: list[LevelProblem] = []
-        self._progress = np.zeros(len(prepared.form.tasks)), 0.0
+        self._seen: tuple[Mapping[str, Array], Mapping[str, Preview]] = {}, {}
         self._predicted: Array | None = None
         self._solutions: dict[str, LevelSolution] = {}
 
@@ -69,9 +69,10 @@ class PrintedTick:
         """The pairs whose distances are kept; None if none are."""
         return self._viewer.distances
 
-    def progress(self) -> tuple[Array, float]:
+    def progress(self, size: float) -> tuple[Array, float]:
         """See `CompiledTick.progress`."""
-        return self._progress
+        errors, previews = self._seen
+        return self._form.lengths(errors, size), self._form.fastest(previews, size)
 
     def pull(self, largest_error: float) -> None:
         """Sets the largest error on which tasks act, m or rad."""
@@ -125,7 +126,7 @@ class PrintedTick:
         tau = np.minimum(np.maximum(tau_0 + U[0], limits.tau_lower), limits.tau_upper)
         if not usable(tau):
             return None
-        self._problems, self._progress = problems, (form.lengths(errors), form.fastest(previews))
+        self._problems, self._seen = problems, (errors, previews)
         self._predicted = printed.predict(q, v, now.q_ddot, U, M_bar, T_s)
         self._solutions = {solution.name: solution for solution in solutions}
         evidence = Evidence(tuple(solutions), self._predicted, errors, values, rows)

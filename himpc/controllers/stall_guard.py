@@ -9,18 +9,30 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.constants import PROGRESS
+from himpc.constants import FULL_SIZE, LEAST_SIZE, PROGRESS
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce
 from himpc.tick.distances import Anywhere, Distances, carried
 from himpc.tick.kernel.slow_down import slow_down
 from himpc.tick.kernel.windup import resist_windup_of
 from robots import Robot
+from robots.joints import joint_axis
+from robots.loading.home import chain_length
 
 Array = NDArray[np.float64]
 
 
 _NONE = np.empty(0)
+
+
+def size_of(robot: Robot) -> float:
+    """Returns the length of a robot as a share of FULL_SIZE, at most 1. The guards divide lengths by it, so
+    that their constants, which are given for long arms, mean the same share of a short one. A robot with a
+    prismatic joint, whose chain is longer than its links, has the size 1."""
+    model = robot.model
+    if any(joint_axis(model, joint)[0] for joint in range(1, model.njoints)):
+        return 1.0
+    return min(1.0, max(chain_length(model, robot.frame_id(robot.tip)) / FULL_SIZE, LEAST_SIZE))
 
 
 @final
@@ -29,13 +41,15 @@ class StallGuard:
     carried by a motor with little torque left, and joints that accelerate, see `tick.kernel.slow_down`.
 
     Attributes:
-        errors: (T,) the lengths of the tasks' errors at the last tick, m or rad; None before the first one.
-        fastest: the largest velocity of a row of a reference at the last tick, m/s or rad/s.
+        size: see `size_of`; lengths of positions are divided by it.
+        errors: (T,) the lengths of the tasks' errors at the last tick, m / size or rad; None before the first
+            one.
+        fastest: the largest velocity of a row of a reference at the last tick, m/s / size or rad/s.
         largest_error: the largest error on which tasks act, m or rad.
     """
 
-    def __init__(self, tasks: int, T_s: float, largest_error: float = math.inf) -> None:
-        self._T_s, self.largest_error = T_s, largest_error
+    def __init__(self, tasks: int, T_s: float, largest_error: float = math.inf, size: float = 1.0) -> None:
+        self._T_s, self.largest_error, self.size = T_s, largest_error, size
         self.errors: Array | None = None
         self.fastest = 0.0
         self._due, self._stall = np.full(tasks, np.inf), np.array((1.0, np.inf))
@@ -63,7 +77,7 @@ class StallGuard:
         slower = np.empty(len(v))
         slow_down(
             *(*self._limits[1:], tau, v, distances.carried, distances.room),
-            *(distances.moves or self.fastest > PROGRESS, self._T_s),
+            *(distances.moves or self.fastest > PROGRESS, self._T_s, self.size),
             *(_NONE if self.errors is None else self.errors, self._due, self._stall, load, mean, slower),
         )
         return limits.with_velocities(slower)
@@ -75,7 +89,7 @@ class WindupGuard:
     always near, and stops a robot that presses, see `tick.kernel.windup`.
 
     Attributes:
-        errors, fastest: as for `StallGuard`.
+        size, errors, fastest: as for `StallGuard`.
         largest_error: the largest error on which tasks act at this tick, m or rad.
     """
 
@@ -85,7 +99,7 @@ class WindupGuard:
         self._v_limit, self._M_bar = np.array(robot.v_limit), M_bar
         self._tau: Array | None = None
         self._wound, self._windup = np.zeros(robot.n), np.array((0.0, 1.0))
-        self.largest_error = stall.largest_error
+        self.largest_error, self.size = stall.largest_error, stall.size
 
     @property
     def errors(self) -> Array | None:
@@ -128,7 +142,7 @@ def guard_of(settings: Settings, tasks: int, robot: Robot) -> StallGuard | Windu
     avoidance = limits.avoidance
     if not avoidance.on and not limits.stall_guard:
         return None
-    stall = StallGuard(tasks, T_s, avoidance.pull or math.inf)
+    stall = StallGuard(tasks, T_s, avoidance.pull or math.inf, size_of(robot))
     if avoidance.on:
         return stall
     return WindupGuard(stall, robot, np.array(settings.M_bar), avoidance.velocity_margin, T_s)

@@ -12,6 +12,7 @@ import numpy as np
 
 from himpc.controllers.controller import Controller
 from himpc.controllers.nhimpc import NHIMPC
+from himpc.controllers.stall_guard import size_of
 from himpc.controllers.weighted import DAMPING_SHARE, Weighted, accumulated
 from himpc.export.entries import (
     ARRAYS,
@@ -37,6 +38,7 @@ from himpc.export.kernel.loop_arrays import (
     MOST,
     ON_ACCELERATION,
     PRESSING,
+    ROBOT_SIZE,
     ROWS,
     SHAPES,
     SIMPLE,
@@ -257,7 +259,7 @@ def _write_guard(f: dict[str, Array], robot: Robot, settings: Settings) -> None:
     limits = settings.limits
     kind = STALL if limits.avoidance.on else PRESSING if limits.stall_guard else UNGUARDED
     f["setup"][[GUARD, MARGIN]] = kind, limits.avoidance.velocity_margin
-    f["setup"][LARGEST_ERROR] = limits.avoidance.pull or np.inf
+    f["setup"][[LARGEST_ERROR, ROBOT_SIZE]] = limits.avoidance.pull or np.inf, size_of(robot)
     f["carried"][:], f["v_limit"][:] = carried(robot), robot.v_limit
 
 

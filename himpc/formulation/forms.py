@@ -114,14 +114,16 @@ class StackForm:
                     changed[task.name] = reference
         return {**previews, **changed} if changed else previews
 
-    def lengths(self, errors: Mapping[str, Array]) -> Array:
-        """Returns the length of each task's error, m or rad."""
-        return np.array([float(np.linalg.norm(errors[task.name])) for task in self.tasks])
+    def lengths(self, errors: Mapping[str, Array], size: float) -> Array:
+        """Returns the length of each task's error, rad, or for a position m divided by `size`."""
+        return np.array([float(np.linalg.norm(errors[task.name])) / _unit(task, size) for task in self.tasks])
 
-    def fastest(self, previews: Mapping[str, Preview]) -> float:
-        """Returns the largest velocity of a coordinate of the references, m/s or rad/s."""
+    def fastest(self, previews: Mapping[str, Preview], size: float) -> float:
+        """Returns the largest velocity of a coordinate of the references, rad/s, or for a position m/s
+        divided by `size`."""
         led = (task for task in self.tasks if not isinstance(task, Damping))
-        return max((float(np.abs(previews[task.name].velocity[0]).max()) for task in led), default=0.0)
+        speeds = (float(np.abs(previews[task.name].velocity[0]).max()) / _unit(task, size) for task in led)
+        return max(speeds, default=0.0)
 
     def pulling(self, error: Array, pull: float) -> Array:
         """Returns x̃ on which the tasks act, (m,): an error beyond its limit is shortened, see
@@ -248,6 +250,10 @@ def prepare(robot: Robot, settings: Settings) -> Prepared:
         idle=not levels,
         off=[task for level in settings.stack if level not in levels for task in level.tasks],
     )
+
+
+def _unit(task: Task, size: float) -> float:
+    return size if isinstance(task, FramePosition) else 1.0
 
 
 def usable(x: Array) -> bool:

@@ -71,7 +71,6 @@ class CompiledTick:
         self._form, self._settings, self._levels = form, settings, levels
         self.arena, self._spans = arena_for(robot, settings, form, off, levels)
         self._python_rows = PythonRows(robot, self.arena, self._spans)
-        self._ends = np.array([span.stop for _, _, span in self._spans[: len(form.tasks)]], np.intp)
         constraints, f = imposed(settings.limits), self.arena.f
         self._rows = Rows(f["L"], f["lower"], f["upper"], constraints)
         self._python_bounds = PythonBounds(robot, self.arena, settings, constraints)
@@ -132,11 +131,11 @@ class CompiledTick:
         """The pairs whose distances are kept; None if none are."""
         return self._python_bounds.distances
 
-    def progress(self) -> tuple[Array, float]:
-        """Returns the length of the last error of each solved task, m or rad, and the largest velocity of a
-        row of a reference, m/s or rad/s."""
-        lengths = np.empty(len(self._ends))
-        return lengths, progress(*self.arena.arguments, self._ends, lengths)
+    def progress(self, size: float) -> tuple[Array, float]:
+        """Returns the length of the last error of each solved task, and the largest velocity of a row of a
+        reference: rad and rad/s, or for positions m and m/s divided by `size`."""
+        lengths = np.empty(len(self._form.tasks))
+        return lengths, progress(*self.arena.arguments, size, lengths)
 
     def pull(self, largest_error: float) -> None:
         """Sets the largest error on which tasks act, m or rad."""

@@ -50,7 +50,7 @@ def guarded(monkeypatch: pytest.MonkeyPatch, change: Callable[..., None]) -> Non
     slow_down = stall_guard.slow_down
 
     def changed(*given: Any) -> None:
-        v, stall, mean = given[3], given[10], given[12]
+        v, stall, mean = given[3], given[11], given[13]
         change(v, stall, mean)
         slow_down(*given)
 

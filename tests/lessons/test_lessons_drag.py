@@ -9,9 +9,15 @@ import numpy as np
 import pytest
 
 from app.__main__ import main
+from himpc.controllers import stall_guard
+from himpc.controllers.stall_guard import size_of
+from himpc.rotation import quaternion
+from lessons.events import MoveTarget
 from lessons.experiments.drag import Motion, dragged, target
 from lessons.scenes.hold import hold_robot
+from lessons.session.start import begin
 from robots import Robot, load_robot, load_urdf_text
+from robots.catalog import CATALOG
 
 FIELD = Path(__file__).parents[1] / "robots" / "field"
 
@@ -105,6 +111,55 @@ def test_a_drag_does_not_end_at_a_position_limit() -> None:
     text = (FIELD / "mimic_in_chain.urdf").read_text()
     motion = dragged(load_urdf_text(text.replace('lower="-2" upper="2"', 'lower="-0.175" upper="0.175"')))
     assert motion.follows, str(motion)
+
+
+def small() -> Robot:
+    """Returns an arm of 0.4 m with four joints: it cannot keep the orientation of its hand, and a pair of
+    links is always within 0.1 m of the distance that is kept."""
+    parts = ['<link name="l0"/>']
+    for k, (axis, at) in enumerate((("0 0 1", 0.05), ("0 1 0", 0.05), ("0 1 0", 0.12), ("0 1 0", 0.12))):
+        parts.append(
+            f'<link name="l{k + 1}"><inertial><origin xyz="0 0 0.05"/><mass value="0.15"/>'
+            '<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>'
+            '<collision><origin xyz="0 0 0.05"/><geometry><cylinder radius="0.015" length="0.06"/></geometry>'
+            f'</collision></link><joint name="j{k}" type="revolute"><parent link="l{k}"/>'
+            f'<child link="l{k + 1}"/><origin xyz="0 0 {at}"/><axis xyz="{axis}"/>'
+            '<limit lower="-2" upper="2" velocity="1" effort="35"/></joint>'
+        )
+    parts.append('<link name="tool0"/><joint name="at" type="fixed"><parent link="l4"/><child link="tool0"/>')
+    return load_urdf_text(f'<robot name="small">{"".join(parts)}<origin xyz="0 0 0.1"/></joint></robot>')
+
+
+def left_after_a_slow_drag(robot: Robot) -> float:
+    """Drags the target as the page does, by 60 mm in 30 small steps within 1.5 s; returns how far the hand
+    is from it after another 2 s, m."""
+    session = begin(hold_robot(robot), 0)
+    position, orientation = session.target("position"), session.target("orientation")
+    assert position is not None and orientation is not None
+    start, turned, way = position.raw, quaternion(orientation.raw), np.array((0.0, 0.06, 0.0))
+    for step in range(1, 31):
+        session.post(MoveTarget("position", tuple((start + step / 30 * way).tolist())))
+        session.post(MoveTarget("orientation", tuple(turned.tolist())))
+        for _ in range(50):
+            session.tick()
+    for _ in range(2000):
+        session.tick()
+    return float(np.linalg.norm(session.plant.frame_pose(robot.tip)[1] - start - way))
+
+
+def test_a_small_arm_arrives_at_a_target_that_is_dragged_slowly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slow drag of a small arm is a fast one for its size. With the lengths of long arms its guard took
+    the target to be at rest, and let the arm creep."""
+    robot = small()
+    assert size_of(robot) < 0.5
+    assert left_after_a_slow_drag(robot) < 1e-4
+    monkeypatch.setattr(stall_guard, "size_of", lambda _: 1.0)
+    assert left_after_a_slow_drag(robot) > 5e-3
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_the_guards_lengths_are_those_of_the_catalogs_robots(name: str) -> None:
+    assert size_of(load_robot(name)) == 1.0
 
 
 def test_the_verdict_says_why_a_robot_does_not_follow() -> None:

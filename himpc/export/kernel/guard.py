@@ -15,6 +15,7 @@ from himpc.export.kernel.loop_arrays import (
     LARGEST_ERROR,
     LEVELS,
     MARGIN,
+    ROBOT_SIZE,
     STALL,
     UNGUARDED,
     LoopArrays,
@@ -57,7 +58,7 @@ def guard(t: TickArrays, p: LoopArrays, d: PairArrays) -> None:
     close = moves or (kind == STALL and d.about[FASTEST_OBJECT] > PROGRESS)
     errors = int(p.state[ERRORS])
     lower_velocities(
-        *(p.free_limit, p.largest_torque, t.tau_0, t.v, p.carried, room, close, T_s),
+        *(p.free_limit, p.largest_torque, t.tau_0, t.v, p.carried, room, close, T_s, p.setup[ROBOT_SIZE]),
         *(p.errors[:errors], p.due, p.stall, p.load, p.mean, t.limits[2]),
     )
     t.scalars[PULL] = p.setup[LARGEST_ERROR]
@@ -78,8 +79,7 @@ def remember_errors(t: TickArrays, p: LoopArrays) -> None:
         if p.solved_index[i] < 0.0:
             continue
         for task in range(len(t.task)):
-            first, size = t.task[task, 2], t.task[task, 3]
-            if p.table[i, FIRST] <= first < p.table[i, LAST]:
-                p.errors[count] = error_length(t, first, first + size)
+            if p.table[i, FIRST] <= t.task[task, 2] < p.table[i, LAST]:
+                p.errors[count] = error_length(t, task, p.setup[ROBOT_SIZE])
                 count += 1
-    p.state[ERRORS], p.state[FASTEST] = float(count), fastest_reference(t)
+    p.state[ERRORS], p.state[FASTEST] = float(count), fastest_reference(t, p.setup[ROBOT_SIZE])

@@ -20,7 +20,7 @@ class LoopArrays(NamedTuple):
     `himpc.tick.kernel.target.roll`.
     """
 
-    setup: Annotated[Array, "10", "1", "constants of the export, see MOST and the names after it"]
+    setup: Annotated[Array, "11", "1", "constants of the export, see MOST and the names after it"]
     state: Annotated[Array, "6", "1", "the memory, see STARTED and the names after it"]
     goal: Annotated[Array, "8 n", "N·m, rad/s, rad, rad/s²", "the desired limits, rows as in `limits`"]
     tau_limit: Annotated[Array, "n", "N·m", "largest torque of each joint; a larger reading is reduced to it"]
@@ -76,10 +76,12 @@ SHAPES = shapes_of(LoopArrays, Array)
 """The shape of every array by name, in the order of the arrays."""
 
 MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE, GUARD, MARGIN, LARGEST_ERROR = range(10)
+ROBOT_SIZE = 10
 """Indices of `setup`: largest number of iterations and their tolerance (N·m), see `NHIMPC`; whether R weighs
 M̄⁻¹Δτ; number of levels and whether the last one is the damping level; largest number of multiplications in a
 tick; whether levels form a strict hierarchy, which is required to switch levels; the kind of guard; share of
-the velocity limits that a guarded robot does not use; the largest error on which tasks act (m, rad)."""
+the velocity limits that a guarded robot does not use; the largest error on which tasks act (m, rad); the
+robot's size, see `himpc.controllers.stall_guard.size_of`."""
 UNGUARDED, STALL, PRESSING = range(3)
 """The kinds of guards: none, `StallGuard` and `WindupGuard`."""
 STARTED, TICKS, FADING, GUARDED, ERRORS, FASTEST = range(6)

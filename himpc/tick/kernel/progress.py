@@ -6,41 +6,43 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from himpc.compilation.compiled import INDICES, VECTOR, inline_kernel, kernel
+from himpc.compilation.compiled import INDICES, NUMBER, VECTOR, inline_kernel, kernel
 from himpc.tick.kernel.arrays import Array, IntArray, TickArrays, arrays_of
+from himpc.tick.kernel.kinematics import POSITION
 
 
 @inline_kernel
-def error_length(t: TickArrays, first: int, last: int) -> float:
-    """Returns the length of the last error of the task with the rows first … last − 1, m or rad."""
+def error_length(t: TickArrays, p: int, size: float) -> float:
+    """Returns the length of the last error of task p, rad, or for a position m divided by `size`."""
     squares = 0.0
-    for i in range(first, last):
+    for i in range(t.task[p, 2], t.task[p, 2] + t.task[p, 3]):
         squares += t.error[i] * t.error[i]
-    return math.sqrt(squares)
+    return math.sqrt(squares) / (size if t.task[p, 0] == POSITION else 1.0)
 
 
 @inline_kernel
-def fastest_reference(t: TickArrays) -> float:
-    """Returns the largest velocity of a row of a reference, m/s or rad/s."""
+def fastest_reference(t: TickArrays, size: float) -> float:
+    """Returns the largest velocity of a row of a reference, rad/s, or for a position m/s over `size`."""
     fastest = 0.0
-    for i in range(t.motion.shape[2]):
-        fastest = max(fastest, abs(t.motion[1, 0, i]))
+    for p in range(len(t.task)):
+        unit = size if t.task[p, 0] == POSITION else 1.0
+        for i in range(t.task[p, 2], t.task[p, 2] + t.task[p, 3]):
+            fastest = max(fastest, abs(t.motion[1, 0, i]) / unit)
     return fastest
 
 
-@kernel(VECTOR, INDICES, INDICES, INDICES, INDICES, VECTOR)
+@kernel(VECTOR, INDICES, INDICES, INDICES, NUMBER, VECTOR)
 def progress(
-    data: Any, where: IntArray, whole: IntArray, whole_where: IntArray, ends: IntArray, lengths: Array
+    data: Any, where: IntArray, whole: IntArray, whole_where: IntArray, size: float, lengths: Array
 ) -> float:
-    """Writes the length of the last error of each task that has an entry in `ends`, m or rad, and returns the
-    largest velocity of a row of a reference, m/s or rad/s.
+    """Writes the length of the last error of each of the first tasks, and returns the largest velocity of a
+    row of a reference: rad and rad/s, or for positions m and m/s divided by `size`.
 
     Args:
         data, where, whole, whole_where: the arena.
-        ends: where the rows of each task end. lengths: the result, one per task.
+        size: see `himpc.controllers.stall_guard.size_of`. lengths: the result, one per task.
     """
     t = arrays_of(data, where, whole, whole_where)
-    first = 0
-    for p in range(len(ends)):
-        lengths[p], first = error_length(t, first, ends[p]), ends[p]
-    return fastest_reference(t)
+    for p in range(len(lengths)):
+        lengths[p] = error_length(t, p, size)
+    return fastest_reference(t, size)

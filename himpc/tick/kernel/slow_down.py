@@ -89,6 +89,7 @@ def lower_velocities(
     room: float,
     moves: bool,
     T_s: float,
+    size: float,
     errors: Array,
     due: Array,
     stall: Array,
@@ -105,7 +106,9 @@ def lower_velocities(
         carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k.
         room: the amount by which the nearest distance exceeds d_safe, m; infinite without a near pair.
         moves: whether a reference or the obstacle moves. T_s: control period, s.
-        errors: the length of each task's error, (T,) m or rad. If it is empty, the stall is not updated.
+        size: see `himpc.controllers.stall_guard.size_of`.
+        errors: the length of each task's error, (T,) m / size or rad. If it is empty, the stall is not
+            updated.
         due: (T,) the errors that the tasks should have reached by now; updated.
         stall: numbers about the stall, see STALL_SHARE; updated.
         load: (n,) the mean load of each joint, as a share of its torque limit; updated.
@@ -133,7 +136,8 @@ def lower_velocities(
             gained = (LEAD / MEAN_SECONDS) * (abs(v[a]) - abs(mean[a]))
             slower[a] = max(slower[a] - max(gained, 0.0), LEAST_WHILE_FASTER * slower[a])
     if len(errors):
-        update_stall(errors, moves, min(room, BLOCKED) if heaviest > HEAVY_LOAD else room, T_s, due, stall)
+        near = max(room, room / size)  # not a violation: d_safe is not smaller for a smaller robot
+        update_stall(errors, moves, min(near, BLOCKED) if heaviest > HEAVY_LOAD else near, T_s, due, stall)
     if stall[STALL_SHARE] <= 1.0 - 1e-6:
         for a in range(n):
             slow = min(slower[a], SLOWEST)
@@ -141,7 +145,7 @@ def lower_velocities(
 
 
 slow_down = kernel(
-    *(VECTOR, VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, MATRIX, NUMBER, FLAG, NUMBER),
+    *(VECTOR, VECTOR, GIVEN_VECTOR, GIVEN_VECTOR, MATRIX, NUMBER, FLAG, NUMBER, NUMBER),
     *(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR),
 )(plain(lower_velocities))
 """`lower_velocities` for callers in Python."""
