@@ -190,7 +190,7 @@ class TickArrays(NamedTuple):
     warm_joint: Annotated[IntArray, "r k", "1", "finish_tick solve_level problems → itself"]
     warm_count: Annotated[IntArray, "r", "1", "finish_tick solve_level problems tick → itself"]
     # The settings.
-    task: Annotated[IntArray, "T 4", "1", "configure → finish_tick linearize"]
+    task: Annotated[IntArray, "T 4", "1", "configure → finish_tick linearize progress"]
     part: Annotated[IntArray, "M", "1", "configure → linearize"]
     law: Annotated[IntArray, "T", "1", "configure preview_writer → linearize"]
     row_knots: Annotated[IntArray, "M", "1", "tables → fallbacks finish_tick solve_level"]
