@@ -37,12 +37,12 @@ def nearest_name(name: str, choices: Iterable[str], cutoff: float = 0.6) -> str 
 
 def unknown_name(what: str, name: str, choices: Iterable[str], hint: str = "") -> InputError:
     """Returns the error for a name that is not among `choices`. The message contains the most similar choice
-    and the list of all choices."""
+    and the list of all choices, or the first eight if one is similar."""
     names = [str(choice) for choice in choices]
     close = nearest_name(str(name), names, cutoff=0.4)
     nearest = f"did you mean '{shortened(close)}'? " if close else ""
     listed: list[str] = []
-    for each in names[:40]:
+    for each in names[: 8 if close else 40]:
         if sum(map(len, listed)) + len(each) > _LISTED:
             break
         listed.append(shortened(each))

@@ -81,10 +81,12 @@ def sensible_payload(
     model: pin.Model, frame: int, q: np.ndarray, tau_limit: np.ndarray, largest: float
 ) -> float:
     """Returns a mass, kg, that the robot can hold at a frame: a third of what its torque limits leave beside
-    gravity at q, at most `largest`, rounded down to 1, 2 or 3 times a power of ten.
+    gravity at q, at most half the mass that the joints move and at most `largest`, rounded down to 1, 2 or 3
+    times a power of ten. A planar robot, on whose joints gravity does not act, gets `largest`.
 
     m = ⅓ min_i (τ_i − |g_i|) / |Jᵀ a|_i, with the linear Jacobian J of the frame and the gravity a, m/s².
-    Robots that cannot hold themselves get 1 g.
+    Robots that cannot hold themselves get 1 g. Files of light arms often give torque limits that no motor of
+    this size has; arms that are sold carry at most about half their own mass.
     """
     data = model.createData()
     gravity = np.abs(pin.computeGeneralizedGravity(model, data, q))
@@ -94,6 +96,8 @@ def sensible_payload(
     per_kg = np.abs(J.T @ model.gravity.linear)
     loaded = per_kg > 1e-6
     held = float(np.min((tau_limit - gravity)[loaded] / per_kg[loaded], initial=math.inf)) / 3.0
+    if loaded.any():
+        held = min(held, sum(model.inertias[joint].mass for joint in range(1, model.njoints)) / 2.0)
     if held >= largest:
         return largest
     power = 10.0 ** math.floor(math.log10(max(held, 1e-3)))

@@ -96,15 +96,15 @@ class TorqueView:
         tip = page.poses_or_still()[-1]
         self._frames = TargetFrames(scene)
         self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # valid until the first tick is reported
-        self._add_targets()
-        self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
-        self._ellipsoids = EllipsoidView(scene, ready.robot, page.colours)
-        self._cover = CoverView(scene, ready.robot)
         exercise = ready.choice.exercise
         asked = exercise is not None and any(
             each.name == "joints moved" for each in signals_of(exercise.part)
         )
         self._turns = JointTurns(scene, ready.robot.joints) if asked else None
+        self._add_targets()
+        self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
+        self._ellipsoids = EllipsoidView(scene, ready.robot, page.colours)
+        self._cover = CoverView(scene, ready.robot)
         self._world, self._contacts = WorldView(scene, ready.world), ContactView(scene)
         self._pull = Pull(scene, robot, ready.robot, page.post)
         curves = [(task.path, page.colours[task.level]) for task in ready.tasks if task.path is not None]
@@ -120,11 +120,10 @@ class TorqueView:
     def _add_targets(self) -> None:
         page, tasks = self._page, self._page.ready.tasks
         position, orientation = draggable(tasks)
-        self._hands = (
-            []
-            if position is None
-            else [Hand(page, position, orientation, self._targets_now(), self._start.clamp)]
-        )
+        self._hands = []
+        if position is not None:
+            targets, alone = self._targets_now(), self._turns is None  # labels of joints are near the target
+            self._hands = [Hand(page, position, orientation, targets, self._start.clamp, invites=alone)]
         self._targets = Targets(page, tasks, page.post)
 
     # ---------------------------------------------------------------- events out

@@ -170,9 +170,10 @@ class TargetGizmo:
         start: np.ndarray,
         rotation: np.ndarray,
         moved: Moved,
+        invites: bool,
     ) -> None:
         """start (3,): initial position of the target, m; rotation (3, 3); moved: called with the raw position
-        and, if rings are shown, the raw rotation."""
+        and, if rings are shown, the raw rotation; invites: see `Hand`."""
         scene, size, radius = page.client.scene, gizmo_size(page.robot), target_radius(page.robot)
         self.position, self.orientation = position, orientation
 
@@ -189,8 +190,10 @@ class TargetGizmo:
         rings = self._rings = Handle(scene, "/target/turn", position.axes, size, rings=True, **place)
         self._ball = ball("/target/ball", TARGET, OPACITY, True)
         self._ghost = ball("/target/ghost", BAD, 0.45, False)
-        self._label = scene.add_label("/target/label", _INVITATION, position=(0.0, 0.0, ARROW * size))
-        self._invites, self._missing, self._paused, self._far = True, 0.0, "", 0.0
+        self._label = scene.add_label(
+            "/target/label", _INVITATION, position=(0.0, 0.0, ARROW * size), anchor="bottom-center"
+        )
+        self._invites, self._missing, self._paused, self._far = invites, 0.0, "", 0.0
         self._accepted = ball("/accepted", TARGET, OPACITY, False)
         self._then = ball("/target_then", TARGET, OPACITY, False)
         self._gap = Gap(scene, "/gap", BAD, 0.006)
@@ -319,9 +322,11 @@ class Hand:
         orientation: TaskView | None,
         targets: dict[str, np.ndarray],
         clamp: viser.GuiCheckboxHandle,
+        invites: bool = True,
     ) -> None:
         """position, orientation: see `draggable`; targets: the session's raw targets by task; clamp: whether
-        the controller gets only reachable targets."""
+        the controller gets only reachable targets; invites: whether a label invites to drag the target until
+        it was dragged."""
         self.verdict: Reachability | None = None
         self._page, self._clamp, self._targets = page, clamp, targets
         self._position, self._orientation = position, orientation
@@ -337,7 +342,7 @@ class Hand:
         self._place = full(position, position.raw if start is None else start, hand)
         self._judge = ReachabilityWorker(page.robot, self._placed, self._judged)
         rotation = np.eye(3) if turned is None else turned
-        self._gizmo = TargetGizmo(page, position, orientation, self._place, rotation, self._moved)
+        self._gizmo = TargetGizmo(page, position, orientation, self._place, rotation, self._moved, invites)
 
     def _moved(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
         if self._closed:

@@ -54,7 +54,9 @@ class Goal:
             scene.add_cylinder(f"{node}/disc", radius=_DISC, height=0.015, color=colour, opacity=0.6)
         else:
             scene.add_icosphere(f"{node}/ball", radius=_BALL, color=colour, opacity=0.8)
-        self._label = scene.add_label(f"{node}/label", role, position=(0.0, 0.0, 0.9 * size + 0.06))
+        self._label = scene.add_label(
+            f"{node}/label", role, position=(0.0, 0.0, 0.9 * size + 0.06), anchor="bottom-center"
+        )
         self._gap = Gap(scene, f"/gap/{role}", colour, 0.008, _GAP)
         if moved is not None and self.handle is not None:
             self.handle.listen(lambda: moved(self.place()))

@@ -224,7 +224,7 @@ class GhostView:
         self._root = scene.add_frame("/ghost", show_axes=False)
         self._robot = RobotView(scene, robot, "/ghost", GHOST, _GHOSTLY)
         self._trace = scene.add_line_segments("/ghost/trace", NOTHING, GHOST, thickness=0.004)
-        self._label = scene.add_label("/ghost/label", f"ghost: {words}")
+        self._label = scene.add_label("/ghost/label", f"ghost: {words}", anchor="bottom-center")
 
     def move(self, ghost: GhostState) -> None:
         self._robot.move(ghost.poses[:-1])
@@ -254,7 +254,7 @@ class RecordedRun:
         robot = load_robot(told["robot"])
         self._q, self._period, self._began = np.array(told["q"]), float(told["period"]), now
         self._poses, self._view = LinkPoses(robot), RobotView(client.scene, robot, "/recorded")
-        self._label = client.scene.add_label("/recorded/label", "a recorded run")
+        self._label = client.scene.add_label("/recorded/label", "a recorded run", anchor="bottom-center")
         aim(client.camera, robot, phone, np.empty((0, 3)))
         self.follow(now)
 
@@ -278,7 +278,9 @@ class JointTurns:
     def __init__(self, scene: viser.SceneApi, joints: Sequence[int]) -> None:
         """joints: indices of the joints that get a label, in the order of the poses, from 1 on."""
         self._joints = joints
-        self._labels = [scene.add_label(f"/turn/{k}", "", visible=False) for k in joints]
+        self._labels = [
+            scene.add_label(f"/turn/{k}", "", visible=False, anchor="center-center") for k in joints
+        ]
         self._start: np.ndarray | None = None
 
     def draw(self, t: float, q: np.ndarray, poses: np.ndarray, window: PlotWindow) -> None:

@@ -211,7 +211,9 @@ class _Target:
         elif not turning:
             scene.add_icosphere(mark, radius=radius, color=colour, opacity=OPACITY)
         above = (0.65 if turning or "z" not in along else 1.0) * size + 0.04
-        scene.add_label(f"{node}/control/label", task.name, position=(0.0, 0.0, above))
+        scene.add_label(
+            f"{node}/control/label", task.name, position=(0.0, 0.0, above), anchor="bottom-center"
+        )
         self._gap = Gap(scene, f"/gaps/{task.name}", colour, 0.005, radius)
         move = None if turning else self._put if flat else self._handle.move_to
         turn = self._handle.turn_by if turning else None

@@ -48,7 +48,7 @@ class Trails:
             )
         self._trace = scene.add_line_segments(f"/trace{name}", NOTHING, colour, thickness=0.004)
         self._prediction = scene.add_line_segments(f"/prediction{name}", NOTHING, LEVELS[4], thickness=0.008)
-        self._label = scene.add_label(f"/prediction_label{name}", "", visible=False)
+        self._label = scene.add_label(f"/prediction_label{name}", "", visible=False, anchor="top-center")
 
     def show(self, trace: bool, prediction: bool) -> None:
         self._trace.visible = trace

@@ -84,3 +84,13 @@ def test_a_robot_holds_three_times_its_payload(name: str) -> None:
     with_mass = pin.computeGeneralizedGravity(loaded, loaded.createData(), robot.home)
     assert (np.abs(with_mass) <= weak.tau_limit + 1e-9).all()
     assert name == "planar3" or 1e-3 <= found[1] < 3.0  # gravity does not act on its joints
+
+
+def test_a_light_arm_gets_at_most_half_its_mass() -> None:
+    """The file of a teaching arm of 0.6 kg gives 35 N m to each joint, for which it was offered 3 kg."""
+    robot = load_robot("panda")
+    light = robot.model.copy()
+    for joint in range(1, light.njoints):
+        light.inertias[joint] = pin.Inertia(0.08, np.zeros(3), 1e-4 * np.eye(3))
+    found = sensible_payload(light, robot.frame_id(robot.tip), robot.home, robot.tau_limit, 3.0)
+    assert found == pytest.approx(0.2) and found <= 0.5 * 0.08 * robot.n
