@@ -20,7 +20,7 @@ from app.link.process import Spares, wait_until
 from app.web.sessions import WORKER
 
 HERE = Path(__file__).parent
-LINK = pytest.mark.nightly("app/link", "app/client", "app/worker")
+LINK = pytest.mark.nightly("app/link/fork_server.py", "app/link/process.py")
 
 
 def parent(learner: SimulationClient) -> int:
