@@ -188,6 +188,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         always = item.nodeid.startswith(_ALWAYS) or item.get_closest_marker("nightly") is not None
         if whole and tested and not always:
             item.add_marker(pytest.mark.nightly(*tested, *_EVERYTHING))
+    marks = [mark for item in items for mark in item.iter_markers("nightly")]
+    gone = [
+        path for path in {path for mark in marks for path in mark.args} if not any(_ROOT.glob(f"{path}*"))
+    ]
+    if gone:
+        raise pytest.UsageError(f"these paths of the mark nightly are no files any more: {sorted(gone)}")
     left_out = [item for item in items if not _runs(item, config)]
     if left_out:
         items[:] = [item for item in items if item not in set(left_out)]

@@ -9,27 +9,9 @@ from typing import Any
 import pytest
 
 from app.link.choice import SceneChoice
-from app.link.messages import Reached
-from app.link.process import hang_up, receive, send
+from app.link.process import hang_up, receive
 from app.worker.simulation import SimulationRunner
 from lessons.scenes.run_spec import RunSpec
-
-
-def test_a_report_with_shared_memory_brings_its_open_file() -> None:
-    body = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
-    ends: tuple[Any, Any] = multiprocessing.Pipe()
-    here, there = ends
-    try:
-        send(there, body.ready())
-        send(there, Reached(0.5))
-        ready = receive(here)
-        assert ready.block != body.block.file and os.fstat(ready.block) == os.fstat(body.block.file)
-        assert receive(here) == Reached(0.5)
-        os.close(ready.block)
-    finally:
-        body.close()
-        here.close()
-        there.close()
 
 
 def test_a_report_that_breaks_off_leaves_no_open_file() -> None:

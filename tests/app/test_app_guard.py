@@ -197,11 +197,8 @@ def test_no_token_lets_everybody_in() -> None:
 def test_cookies_of_two_servers_live_in_one_jar() -> None:
     """A browser stores the cookies of both servers and sends both to each server; neither cookie opens the
     other server."""
-    servers = [
-        PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
-        for _ in range(2)
-    ]
-    try:
+    with served() as one, served() as other:
+        servers = (one, other)
         opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         for server in servers:
             assert opener.open(server.link).url == f"{server.url}/"
@@ -219,9 +216,6 @@ def test_cookies_of_two_servers_live_in_one_jar() -> None:
                     subprotocols=PROTOCOL,
                     additional_headers={"Cookie": cookie},
                 )
-    finally:
-        for server in servers:
-            server.close()
 
 
 @pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="needs another user: run it as root")
@@ -329,8 +323,7 @@ def test_no_process_stays_if_the_server_cannot_be_made(monkeypatch: pytest.Monke
 
 def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogCaptureFixture) -> None:
     """The server is closed while it still waits for the page's answer about its local storage."""
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
-    with dial(server) as page:
+    with served() as server, dial(server) as page:
         page.send(pack(camera()))
         assert wait_until(lambda: server.guard.taken > 0, LONG)
         server.close()
@@ -364,8 +357,7 @@ def test_a_page_that_comes_while_the_server_closes_leaves_no_noise(
     monkeypatch.setattr(Visit, "arrive", late)
     monkeypatch.setattr(Visit, "leave", leaves)
     monkeypatch.setattr(private, "stop", stops)
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
-    with dial(server) as page:
+    with served() as server, dial(server) as page:
         page.send(pack(camera()))
         assert came.wait(LONG)
         server.close()

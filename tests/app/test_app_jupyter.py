@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import socket
 import subprocess
 import sys
 import urllib.error
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from served import answers
 from websockets.exceptions import InvalidStatus
 
 from app.jupyter.launcher import OPTIONS, launcher
@@ -73,11 +73,6 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Pat
 
 def _addresses(log: Path) -> list[str]:
     return re.findall(r"(http://127\.0\.0\.1:[1-9]\d*/user/zoe/)", log.read_text())
-
-
-def answers(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def ask(url: str, headers: Mapping[str, str]) -> tuple[int, str]:

@@ -16,15 +16,12 @@ from viser import __version__
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.web.load import Load, report
 from app.web.passes import HEADER
-from app.web.server import PageServer, ServerOptions
 from browsing.wire import Wire, eventually
 from lessons.events import Set
 from lessons.replay.state import State, decode, encode
-from lessons.scenes.run_spec import RunSpec
 
 TOKEN = "a-token-of-ones-own-0"
 _LINE = re.compile(r"# (HELP|TYPE) [a-z_]+ .+|[a-z_]+ \d+")
@@ -137,10 +134,9 @@ def test_a_code_is_opened_on_a_thread_of_the_page(
         return decode(code)
 
     monkeypatch.setattr("app.panels.run.export.decode", noted)
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), ServerOptions(port=0, max_sessions=1))
     loops: list[threading.Thread] = []
-    server._viser.get_event_loop().call_soon_threadsafe(lambda: loops.append(threading.current_thread()))
-    try:
+    with served() as server:
+        server._viser.get_event_loop().call_soon_threadsafe(lambda: loops.append(threading.current_thread()))
         with Wire(server.guest_link) as page:
             assert eventually(lambda: page.find("Open it") is not None, 60.0)
             (learner,) = server.sessions.learners
@@ -151,5 +147,3 @@ def test_a_code_is_opened_on_a_thread_of_the_page(
             page.write(button, value=True)
             assert eventually(lambda: bool(ran), 60.0)
             assert loops and ran[0] not in loops
-    finally:
-        server.close()

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from served import answers, free_port, served
 from viser import __version__
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -43,12 +44,6 @@ NAME = "lab.example.org"
 PROTOCOL: Any = [f"viser-v{__version__}"]
 LONG = 60.0
 NGINX = pytest.mark.nightly("app/web", "docs/serving.md")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture(scope="module")
@@ -74,24 +69,26 @@ def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
         capture_output=True,
     )
     origin = f"https://{NAME}:{port}"
-    server = PageServer(
-        SceneChoice(RunSpec("planar3-hold")),
-        ServerOptions(port=0, max_sessions=1, trusted_origins=[origin], own_files=Folder.at(str(folder))),
-    )
     printed = re.findall(r"```nginx\n(.*?)```", PAGE.read_text(), re.DOTALL)
     assert len(printed) == 1
-    site = printed[0]
-    for text, here in (
-        ("listen 443 ssl", f"listen 127.0.0.1:{port} ssl"),
-        (f"/etc/ssl/certs/{NAME}.pem", str(certificate)),
-        (f"/etc/ssl/private/{NAME}.key", str(key)),
-        ("http://127.0.0.1:8080", server.url),
-    ):
+    with served(trusted_origins=[origin], own_files=Folder.at(str(folder))) as server:
+        site = replaced(
+            printed[0],
+            ("listen 443 ssl", f"listen 127.0.0.1:{port} ssl"),
+            (f"/etc/ssl/certs/{NAME}.pem", str(certificate)),
+            (f"/etc/ssl/private/{NAME}.key", str(key)),
+            ("http://127.0.0.1:8080", server.url),
+        )
+        with nginx_with(nginx, folder, site, port):
+            yield server, port, certificate
+
+
+def replaced(site: str, *texts: tuple[str, str]) -> str:
+    """Returns the printed configuration with what holds here; each text stands in it once."""
+    for text, here in texts:
         assert site.count(text) == 1
         site = site.replace(text, here)
-    with nginx_with(nginx, folder, site, port):
-        yield server, port, certificate
-    server.close()
+    return site
 
 
 @contextmanager
@@ -116,11 +113,6 @@ def nginx_with(nginx: str, folder: Path, site: str, port: int) -> Iterator[None]
     finally:
         process.terminate()
         process.wait(LONG)
-
-
-def answers(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def get(port: int, certificate: Path, path: str = "/", *, host: str = NAME, cookie: str = "") -> str:
@@ -230,33 +222,21 @@ def test_phones_need_no_password_and_get_no_account(nginx: str, tmp_path: Path) 
 
 
 @contextmanager
-def balanced(nginx: str, folder: Path, servers: int) -> Iterator[tuple[str, list[PageServer]]]:
-    """Runs servers of one session each, with one token, behind the printed balancer; yields their link."""
+def balanced(nginx: str, folder: Path) -> Iterator[tuple[str, list[PageServer]]]:
+    """Runs two servers of one session each, with one token, behind the printed balancer."""
     port, token = free_port(), "one-token-for-all-servers"
     origin = f"http://127.0.0.1:{port}"
-    running = [
-        PageServer(
-            SceneChoice(RunSpec("planar3-hold")),
-            ServerOptions(
-                port=0, max_sessions=1, grace=0.5, trusted_origins=[origin], token=token, refers=True
-            ),
-        )
-        for _ in range(servers)
-    ]
+    options = {"grace": 0.5, "trusted_origins": [origin], "token": token, "refers": True}
     (site,) = re.findall(r"```text\n(upstream .*?)```", PAGE.read_text(), re.DOTALL)
-    for text, here in (
-        ("lab-1.example.org:8080", running[0].url.removeprefix("http://")),
-        ("lab-2.example.org:8080", running[1].url.removeprefix("http://")),
-        ("listen 80;", f"listen 127.0.0.1:{port};"),
-    ):
-        assert site.count(text) == 1
-        site = site.replace(text, here)
-    try:
+    with served(**options) as first, served(**options) as second:
+        site = replaced(
+            site,
+            ("lab-1.example.org:8080", first.url.removeprefix("http://")),
+            ("lab-2.example.org:8080", second.url.removeprefix("http://")),
+            ("listen 80;", f"listen 127.0.0.1:{port};"),
+        )
         with nginx_with(nginx, folder, site, port):
-            yield f"{origin}/?{QUERY}={token}", running
-    finally:
-        for each in running:
-            each.close()
+            yield f"{origin}/?{QUERY}={token}", [first, second]
 
 
 def learners(servers: Sequence[PageServer]) -> list[SimulationClient]:
@@ -267,7 +247,7 @@ def learners(servers: Sequence[PageServer]) -> list[SimulationClient]:
 def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tmp_path: Path) -> None:
     """There are two servers of one session each, with one token. The second learner gets the second robot;
     the third is asked to wait, and gets the place that becomes free."""
-    with balanced(nginx, tmp_path, 2) as (link, servers):
+    with balanced(nginx, tmp_path) as (link, servers):
         origin, _, token = link.partition(f"/?{QUERY}=")
         with Wire(link):
             assert eventually(lambda: len(learners(servers)) == 1, LONG)
@@ -290,7 +270,7 @@ def test_a_page_goes_on_with_another_server_where_it_was(nginx: str, tmp_path: P
     """A server that is going to stop admits nobody and informs its page. After it has ended, the page's
     browser brings the step of its lesson, or the settings of its scene, to the other server."""
     lesson = SceneChoice.of_lesson(LessonPlace.at("one-task", 2))
-    with balanced(nginx, tmp_path, 2) as (link, servers):
+    with balanced(nginx, tmp_path) as (link, servers):
         storage = Storage()
         with opened(link, storage, LONG) as page:
             assert eventually(lambda: len(learners(servers)) == 1, LONG)

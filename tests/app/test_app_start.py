@@ -32,13 +32,18 @@ from lessons.scenes.run_spec import RunSpec
 from app.web import server
 from browsing.wire import let_in
 server._load_on_thread = lambda choice: None  # what follows once it listens
-running = server.PageServer({{choice}}, server.ServerOptions(port=0))
-try:
-    page = urllib.request.Request(running.url, headers={{"Cookie": let_in(running.link)}})
-    assert urllib.request.urlopen(page).status == 200
-    print(*sorted(set({NUMERICS}) & set(sys.modules)))
-finally:
-    running.close()
+for choice in (
+    SceneChoice(RunSpec("iiwa14-hold")),
+    SceneChoice(RunSpec("ridgeback-ur10-square")),
+    SceneChoice.opening("one-task"),
+):
+    running = server.PageServer(choice, server.ServerOptions(port=0))
+    try:
+        page = urllib.request.Request(running.url, headers={{"Cookie": let_in(running.link)}})
+        assert urllib.request.urlopen(page).status == 200
+    finally:
+        running.close()
+print(*sorted(set({NUMERICS}) & set(sys.modules)))
 """
 
 
@@ -48,40 +53,23 @@ from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
 from app.web.server import PageServer, ServerOptions
 from browsing.wire import Wire, eventually
-running = PageServer(SceneChoice(RunSpec("{scene}")), ServerOptions(port=0, class_names={named}))
-try:
-    with Wire(running.guest_link) as page:
-        assert eventually(lambda: page.shows("Running"), 110.0)
-    print(*sorted({"numba", "matplotlib"} & set(sys.modules)))
-finally:
-    running.close()
+for scene, named in (("iiwa14-hold", None), ("ridgeback-ur10-square", True)):
+    running = PageServer(SceneChoice(RunSpec(scene)), ServerOptions(port=0, class_names=named))
+    try:
+        with Wire(running.guest_link) as page:
+            assert eventually(lambda: page.shows("Running"), 110.0)
+    finally:
+        running.close()
+print(*sorted({"numba", "matplotlib"} & set(sys.modules)))
 """
 
 
-@pytest.mark.parametrize(
-    "choice",
-    [
-        "SceneChoice(RunSpec('iiwa14-hold'))",
-        "SceneChoice(RunSpec('ridgeback-ur10-square'))",
-        "SceneChoice.opening('one-task')",
-    ],
-)
-def test_it_listens_before_anything_that_computes_is_loaded(choice: str) -> None:
-    """viser itself needs NumPy; all other libraries are loaded while the browser opens."""
-    code = LISTEN.replace("{choice}", choice)
+@pytest.mark.parametrize("program", [LISTEN, SHOWN], ids=["listens", "shows a robot"])
+def test_the_process_of_the_pages_does_not_load_what_computes(program: str) -> None:
+    """viser itself needs NumPy. All other libraries are loaded after the server listens, while the browser
+    opens. A running robot is shown without Numba and matplotlib, on both levels and with a class."""
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == []
-
-
-@pytest.mark.parametrize(("scene", "named"), [("iiwa14-hold", None), ("ridgeback-ur10-square", True)])
-def test_the_process_of_the_pages_compiles_nothing(scene: str, named: bool | None) -> None:
-    """The server's process shows a running robot without importing Numba or matplotlib, also with a class."""
-    code = SHOWN.replace("{scene}", scene).replace("{named}", str(named))
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == []

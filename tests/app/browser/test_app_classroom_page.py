@@ -20,10 +20,7 @@ from lessons.scenes.run_spec import RunSpec
 
 pytestmark = [
     pytest.mark.usefixtures("one_fork_server"),
-    pytest.mark.nightly(
-        *(f"app/{part}" for part in ("adapter", "classes", "client", "link", "page", "panels/run", "web")),
-        "browsing/",
-    ),
+    pytest.mark.nightly("app/classes", "app/panels/run/classroom"),
 ]
 
 

@@ -25,10 +25,7 @@ from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
-INSIDE = pytest.mark.nightly(
-    *(f"app/{part}" for part in ("adapter", "html", "link/inside", "page", "panels", "worker")),
-    *("browsing/", "lessons/geometry", "lessons/scenes/planar"),
-)
+INSIDE = pytest.mark.nightly("app/panels/inside", "lessons/geometry")
 ARM = 0.08
 """Distance from the arm at which the gizmo of this small arm is grasped, m."""
 
