@@ -24,7 +24,7 @@ from lessons.events import Set
 from lessons.replay.state import State, decode, encode
 
 TOKEN = "a-token-of-ones-own-0"
-_LINE = re.compile(r"# (HELP|TYPE) [a-z_]+ .+|[a-z_]+ \d+")
+_LINE = re.compile(r"# (HELP|TYPE) [a-z_]+ .+|[a-z_]+ \d+\.0")
 
 
 def load(attached: int = 0, maximum: int = 2, stopping: bool = False) -> Load:
@@ -54,7 +54,7 @@ def test_metrics_are_prometheus_text() -> None:
     lines = found[2].splitlines()
     assert found[2].endswith("\n") and all(_LINE.fullmatch(line) for line in lines)
     samples = dict(line.split() for line in lines if not line.startswith("#"))
-    assert samples["himpc_lab_sessions"] == samples["himpc_lab_sessions_maximum"] == "2"
+    assert samples["himpc_lab_sessions"] == samples["himpc_lab_sessions_maximum"] == "2.0"
     kinds = dict(line.split()[2:4] for line in lines if line.startswith("# TYPE"))
     assert kinds.keys() == samples.keys()
     assert all((kind == "counter") == name.endswith("_total") for name, kind in kinds.items())
@@ -82,7 +82,7 @@ def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server
             assert (status, json.loads(text)["state"]) == (503, "full")
             status, headers, text = get(server.url, **token)
             assert status == 503 and "Refresh" in headers and "All places are taken" in text
-            assert "himpc_lab_sessions_attached 1" in get(f"{server.url}/metrics")[2]
+            assert "himpc_lab_sessions_attached 1.0" in get(f"{server.url}/metrics")[2]
             with pytest.raises(InvalidStatus) as refused:
                 connect(
                     server.url.replace("http", "ws"),
