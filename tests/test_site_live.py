@@ -165,6 +165,9 @@ FIGURES = pytest.mark.nightly(
     "docs/browser",
     "docs/build.py",
     "docs/figures",
+    "himpc/export",
+    "himpc/tick/kernel",
+    "lessons/course",
 )
 """The mark of all tests of the built figures; compiling their kernel for a browser takes minutes. At every
 push the tests below without this mark compare the model and check the program."""

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import stat
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from served import free_port
 from test_app_class import LONG, STEP, Line, cookie_of
+from test_app_load import get
+from websockets.exceptions import InvalidStatus
 
 from app.classes.gathering import Gathering
 from app.classes.saved import restored, saved
@@ -54,6 +57,14 @@ class Started:
         return self.process.communicate(timeout=LONG)[1]
 
 
+@pytest.fixture
+def port() -> Iterator[int]:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        number = free.getsockname()[1]
+    yield number
+
+
 def phone_at(address: str, seat: str = "") -> Line:
     line = Line(address)
     line.send(do="hello", seat=seat)
@@ -66,9 +77,8 @@ def contains(folder: Path, text: str) -> bool:
 
 
 def test_a_class_whose_server_is_killed_goes_on_with_its_addresses_and_votes(
-    tmp_path: Path,
+    tmp_path: Path, port: int
 ) -> None:
-    port = free_port()
     first = Started(port, tmp_path)
     try:
         cookie, phones, others = (
@@ -116,12 +126,17 @@ def test_a_class_whose_server_is_killed_goes_on_with_its_addresses_and_votes(
         assert first.lines["phones"] == phones
         first.end(signal.SIGINT)
         assert list(tmp_path.glob("himpc-lab/*")) == [], "Ctrl-C ends the class"
+        first = Started(port, tmp_path)
+        assert first.lines["phones"] != phones and "continues" not in first.lines
+        with pytest.raises(InvalidStatus):
+            phone_at(phones)
+        assert get(phones)[0] == 403, "the page says that the class has started anew"
     finally:
         first.end(signal.SIGKILL)
 
 
-def test_a_class_without_names_leaves_no_file(tmp_path: Path) -> None:
-    started = Started(free_port(), tmp_path, "--no-names")
+def test_a_class_without_names_leaves_no_file(tmp_path: Path, port: int) -> None:
+    started = Started(port, tmp_path, "--no-names")
     try:
         with phone_at(started.lines["phones"]):
             time.sleep(0)

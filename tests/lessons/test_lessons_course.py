@@ -32,9 +32,15 @@ HAND = Signal("error/position", "mm")
 CLAIMED = ("one-task", "how-far-ahead", "how-strict-is-strict")
 """Lessons whose claims are judged at every push: about the planar arm, the iiwa, and a mobile base. All runs
 of the course take a core three minutes."""
-JUDGING = ("lessons/teaching/check.py", "lessons/teaching/lesson.py", "lessons/teaching/measure.py")
-"""What judges the claims of any lesson. Of all else that a run depends on, the lessons in `CLAIMED` are a
-sample at a push."""
+RUNS = (
+    "himpc/",
+    "lessons/scenes",
+    "lessons/session",
+    "lessons/settings",
+    "lessons/teaching",
+    "robots/plant.py",
+)
+"""What a run of any lesson depends on."""
 
 
 @pytest.mark.parametrize(
@@ -42,7 +48,7 @@ sample at a push."""
     [
         name
         if name in CLAIMED
-        else pytest.param(name, marks=pytest.mark.nightly(f"lessons/course/{name}.", *JUDGING))
+        else pytest.param(name, marks=pytest.mark.nightly(f"lessons/course/{name}.", *RUNS))
         for name in COURSE
     ],
 )

@@ -15,7 +15,9 @@ OFF = ["avoidance.on=false"]
 
 PUSH = (("iiwa14", True), ("baxter", False), ("generated", False))
 """Robots, and whether a target moves often, whose drags are made at every push."""
-KEEP = pytest.mark.nightly("benchmarks/avoidance.py", "himpc/limits", "robots/covering")
+KEEP = pytest.mark.nightly(
+    "benchmarks/avoidance.py", "himpc/controllers", "himpc/limits", "himpc/tick", "robots/covering"
+)
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ PAIRS = [
         if (controller, robot) in OFTEN
         else pytest.mark.nightly("himpc/printed.py")
         if controller == "himpc_printed"
-        else pytest.mark.nightly("himpc/controllers"),
+        else pytest.mark.nightly("himpc/controllers", "himpc/tick", "himpc/limits", "robots/plant.py"),
     )
     for controller in CONTROLLERS
     for robot in ROBOTS
