@@ -222,12 +222,7 @@ class History:
     def window(self, until: float | None = None) -> PlotWindow:
         """Returns the curves for the plots up to the simulated time `until` (s); None: the present time."""
         end = self.bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
-        wanted = np.arange(end - BUCKETS + 1, end + 1)
-        wanted[(wanted > self.bucket) & (wanted <= self.bucket + _HELD)] = self.bucket
-        slots = wanted % _SLOTS
-        known = self._numbers[slots] == wanted
-        known &= wanted >= 0
-        return PlotWindow(self.layout, 2 * (end - BUCKETS + 1), known, slots, self._pairs, self._bits)
+        return PlotWindow(self, end)
 
     def at(self, t: float) -> np.ndarray:
         """Returns the newest row at the simulated time t (s), as precisely as the history stores it."""
@@ -245,20 +240,16 @@ class History:
 class PlotWindow:
     """The curves of the plots at one moment: BUCKETS pairs of values, oldest first."""
 
-    def __init__(
-        self,
-        layout: Layout,
-        first: int,
-        known: np.ndarray,
-        slots: np.ndarray,
-        pairs: np.ndarray,
-        bits: np.ndarray,
-    ) -> None:
-        """first: number of the oldest bucket, counted from the start of the run; it may be negative."""
-        self.layout = layout
-        self.first = first
-        self._known, self._slots = known, slots
-        self._pairs, self._bits = pairs, bits
+    def __init__(self, history: History, end: int) -> None:
+        """end: number of the newest bucket, counted from the start of the run."""
+        self.layout = history.layout
+        self.first = 2 * (end - BUCKETS + 1)
+        """Number of the oldest value; it may be negative."""
+        wanted = np.arange(end - BUCKETS + 1, end + 1)
+        wanted[(wanted > history.bucket) & (wanted <= history.bucket + _HELD)] = history.bucket
+        self._slots = wanted % _SLOTS
+        self._known = (history._numbers[self._slots] == wanted) & (wanted >= 0)
+        self._pairs, self._bits = history._pairs, history._bits
 
     def columns(self, which: slice) -> np.ndarray:
         """Returns the values of some columns, (2 · BUCKETS, k); NaN where nothing was recorded."""
