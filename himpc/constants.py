@@ -56,9 +56,9 @@ PROGRESS = 0.05
 """
 PROGRESS_SHARE = 0.25
 """1/s: see PROGRESS. Without an obstacle, errors decrease ten times as fast as this share requires."""
-MOVING = 0.01
-"""m/s, rad/s: a reference or an object that is faster than this counts as moving. A stalled robot, whose
-joints may move at SLOWEST, follows a slower reference without being released."""
+MOVING, MOVING_ANYWHERE = 0.01, 0.05
+"""m/s, rad/s: a reference or an object that is faster than the first counts as moving. The second is for
+robots without distances, for which an obstacle is always near: they come to rest sooner."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05

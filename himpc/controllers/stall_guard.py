@@ -9,7 +9,6 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.constants import MOVING
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce
 from himpc.tick.distances import Anywhere, Distances, carried
@@ -63,7 +62,7 @@ class StallGuard:
         slower = np.empty(len(v))
         slow_down(
             *(*self._limits[1:], tau, v, distances.carried, distances.room),
-            *(distances.moves or self.fastest > MOVING, self._T_s),
+            *(distances.moves or self.fastest > distances.moving, self._T_s),
             *(_NONE if self.errors is None else self.errors, self._due, self._stall, load, mean, slower),
         )
         return limits.with_velocities(slower)
@@ -109,7 +108,7 @@ class WindupGuard:
             self._tau = np.array(tau)
         slowed = self._stall.limits(limits, tau, v, self._around)
         pressing = resist_windup_of(
-            *(self._M_bar, self._v_limit, tau, v, self.fastest > MOVING, self._T_s),
+            *(self._M_bar, self._v_limit, tau, v, self.fastest > self._around.moving, self._T_s),
             *(self._tau, self._wound, self._windup, slowed.v_limit),
         )
         self.largest_error = min(self._stall.largest_error, pressing)

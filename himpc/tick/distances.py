@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.constants import MOVING, WITHIN
+from himpc.constants import MOVING, MOVING_ANYWHERE, WITHIN
 from himpc.kinematics.geometry import Geometry, geometry
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import row_count
@@ -131,7 +131,10 @@ class Distances:
     Attributes:
         carried: see the function `carried`.
         velocity_margin: see `Avoidance`.
+        moving: a faster reference counts as moving, m/s or rad/s.
     """
+
+    moving = MOVING
 
     def __init__(self, robot: Robot, avoidance: Avoidance) -> None:
         self._robot, self._avoidance, self._named = robot, avoidance, ("",) * robot.n
@@ -224,13 +227,14 @@ class Anywhere(NamedTuple):
     """Stands for the distances of a controller that keeps none: an obstacle may be near at any time.
 
     Attributes:
-        carried, velocity_margin, room, moves: as for `Distances`.
+        carried, velocity_margin, room, moves, moving: as for `Distances`.
     """
 
     carried: Array
     velocity_margin: float
     room: float = 0.0
     moves: bool = False
+    moving: float = MOVING_ANYWHERE
 
 
 def _kind(shape: WorldShape) -> tuple[object, ...]:

@@ -102,7 +102,7 @@ def test_a_change_of_a_setting_loads_no_robot_in_the_server(
     with served() as server, Wire(server.guest_link):
         assert eventually(lambda: bool(server.sessions.learners), 60.0)
         learner = server.sessions.learners[0]
-        assert eventually(lambda: learner.code != "", 60.0)
+        assert eventually(lambda: learner.code != "" and not server.loading, 60.0)
         loaded: list[str] = []
 
         def load(name: str, *_: object, **__: object) -> None:

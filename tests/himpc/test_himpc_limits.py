@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from himpc.compilation.compiled import plain
 from himpc.limits import POSITION, TORQUE, VELOCITY, Limits, LimitsInForce, build_rows, in_force, ramp
 from himpc.limits.braking import least_slack
 from himpc.limits.limits import POSITION_MARGIN
@@ -282,7 +283,7 @@ def test_an_arm_that_loses_its_contact_gains_the_speed_that_the_guard_assumes() 
     M = root @ root.T + np.eye(4)
     M_bar = 0.3 * np.linalg.eigvalsh(M)[0] * rng.uniform(0.5, 1.0, 4)
     v_limit = rng.uniform(1.0, 3.0, 4)
-    tau, v = 0.5 * taken_back(M_bar, v_limit, T_s), np.zeros(4)
+    tau, v = 0.5 * plain(taken_back)(M_bar, v_limit, T_s), np.zeros(4)
     for _ in range(20_000):
         a = np.linalg.solve(M, tau)
         v, tau = v + T_s * a, tau - M_bar * a

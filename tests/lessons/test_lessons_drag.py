@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.__main__ import main
-from himpc.controllers import stall_guard
+from himpc.tick.distances import Distances
 from lessons.events import MoveTarget
 from lessons.experiments.drag import Motion, dragged, target
 from lessons.scenes.hold import hold_robot
@@ -152,7 +152,7 @@ def test_a_robot_follows_a_target_that_is_dragged_slowly(
     robot = small()
     assert left_after_a_slow_drag(robot, speed) < 1e-4
     if speed == 0.02:
-        monkeypatch.setattr(stall_guard, "MOVING", 0.05)
+        monkeypatch.setattr(Distances, "moving", 0.05)
         assert left_after_a_slow_drag(robot, speed) > 5e-3
 
 

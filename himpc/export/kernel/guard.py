@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.constants import MOVING
+from himpc.constants import MOVING, MOVING_ANYWHERE
 from himpc.export.kernel.loop_arrays import (
     ERRORS,
     FASTEST,
@@ -52,7 +52,7 @@ def guard(t: TickArrays, p: LoopArrays, d: PairArrays) -> None:
     for a in range(n):
         p.free_limit[a] = (1.0 - p.setup[MARGIN]) * p.v_ramped[a]
         p.largest_torque[a] = max(t.limits[1, a], -t.limits[0, a])
-    moves = p.state[FASTEST] > MOVING
+    moves = p.state[FASTEST] > (MOVING if kind == STALL else MOVING_ANYWHERE)
     room = d.about[ROOM] if kind == STALL else 0.0
     close = moves or (kind == STALL and d.about[FASTEST_OBJECT] > MOVING)
     errors = int(p.state[ERRORS])

@@ -36,8 +36,9 @@ TREND, FREE = range(2)
 the robot is free and 0 if it is stopped."""
 
 
-def taken_back(M_bar: Array, v_limit: Array, T_s: float) -> Array:
-    """Returns the largest torque with which a joint may press, M̄ q̇_max / T_s, (n,) N·m.
+@inline_kernel
+def taken_back(M_bar: float, v_limit: float, T_s: float) -> float:
+    """Returns the largest torque with which a joint may press, M̄ q̇_max / T_s, N·m.
 
     If a contact with the torque τ is lost, the joints accelerate with a₀ = M⁻¹ τ. Time-delay estimation
     takes the torque back by Δτ = −M̄ a in every period, so that a = (1 − M⁻¹ M̄)ᵏ a₀ after k periods. The sum
@@ -45,12 +46,9 @@ def taken_back(M_bar: Array, v_limit: Array, T_s: float) -> Array:
     the true inertia M.
 
     Args:
-        M_bar: (n,) kg·m². v_limit: of the robot, (n,) rad/s. T_s: control period, s.
+        M_bar: kg·m². v_limit: of the robot's joint, rad/s. T_s: control period, s.
     """
     return M_bar * v_limit / T_s
-
-
-_taken_back = inline_kernel(taken_back)
 
 
 @inline_kernel
@@ -85,7 +83,7 @@ def resist_windup(
         carried = carried or abs(v[a]) > CARRIED * v_limit[a]
     growth, most, forgotten = 0.0, 0.0, math.exp(-fastest * T_s / FORGETS)
     for a in range(n):
-        change = (tau[a] - tau_before[a]) / _taken_back(M_bar[a], v_limit[a], T_s)
+        change = (tau[a] - tau_before[a]) / taken_back(M_bar[a], v_limit[a], T_s)
         wound[a] = (wound[a] + change) * forgotten
         tau_before[a] = tau[a]
         growth += change * wound[a]
