@@ -23,9 +23,9 @@ from lessons.course import COURSE, load_lesson
 ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::PendingDeprecationWarning")
 SITE = pytest.mark.nightly(
-    "README", "CONTRIBUTING", "docs/build", "docs/pages", "docs/record", "docs/serving"
+    "README", "CONTRIBUTING", "CHANGELOG", "pyproject", "docs/", "examples/", "himpc/", "lessons/", "robots/"
 )
-"""The mark of all tests of the built site: these files have its texts and build it."""
+"""The mark of all tests of the built site, which is made of these files."""
 QUICK = "one-task"
 """The lesson whose numbers are measured again by these tests."""
 

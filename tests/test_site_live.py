@@ -165,12 +165,18 @@ FIGURES = pytest.mark.nightly(
     "docs/browser",
     "docs/build.py",
     "docs/figures",
+    "docs/pages/lessons.py",
+    "himpc/compilation",
     "himpc/export",
     "himpc/tick/kernel",
     "lessons/course",
+    "lessons/scenes",
+    "lessons/session",
+    "robots/plant.py",
 )
 """The mark of all tests of the built figures; compiling their kernel for a browser takes minutes. At every
-push the tests below without this mark compare the model and check the program."""
+push `test_commands_export.py` replays a controller in WebAssembly, and the tests below without this mark
+compare the model and check the program."""
 
 
 @FIGURES
@@ -204,7 +210,7 @@ def test_a_live_step_is_the_step_of_the_lesson(simulated: Page, lesson_name: str
         assert seen, name
 
 
-FIREFOX = pytest.mark.nightly("docs/browser")
+FIREFOX = pytest.mark.nightly("docs/browser", "himpc/compilation", "himpc/export")
 
 
 @FIREFOX

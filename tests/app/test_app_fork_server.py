@@ -20,7 +20,7 @@ from app.link.process import Spares, wait_until
 from app.web.sessions import WORKER
 
 HERE = Path(__file__).parent
-LINK = pytest.mark.nightly("app/link/fork_server.py", "app/link/process.py")
+LINK = pytest.mark.nightly("app/link", "app/client", "app/worker")
 
 
 def parent(learner: SimulationClient) -> int:
@@ -52,7 +52,6 @@ def test_without_a_fork_server_children_are_spawned(start: Start, worker: str) -
     assert wait_until(lambda: running(another), LONG)
 
 
-@LINK
 def test_a_server_that_nobody_waits_for_any_more_leaves_room_for_the_next(start: Start) -> None:
     """A page that closes at once ends its server before this has connected; the next page has its own."""
     SERVER.end()
@@ -97,7 +96,6 @@ def test_a_robot_without_its_fork_server_can_be_ended(start: Start) -> None:
     assert wait_until(lambda: gone(pid) and running(learner), LONG)
 
 
-@LINK
 def test_a_fork_server_that_is_stopped_is_replaced(start: Start) -> None:
     """A simulation that waits for the stopped server is started from a new one automatically. The stopped
     server is ended, and its children keep running."""

@@ -134,7 +134,6 @@ def test_a_child_that_cannot_be_started_ends_with_a_sentence_that_names_the_limi
     process.close()
 
 
-@pytest.mark.nightly("app/link/fork_server.py", "app/link/process.py")
 def test_after_a_limit_of_processes_a_page_gets_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """If no process can be started, the page says why; when there is room again, it gets its robot."""
     SERVER.end()

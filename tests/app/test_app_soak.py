@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.nightly("app/web/malloc_tuning.py", "benchmarks/soak.py", "benchmarks/client.py")
+pytestmark = pytest.mark.nightly(
+    "app/client", "app/link", "app/page", "app/view", "app/web", "benchmarks/soak.py", "benchmarks/client.py"
+)
 
 ROOT = Path(__file__).parents[2]
 

@@ -123,11 +123,7 @@ def test_what_is_no_message_is_refused(raw: bytes) -> None:
     ("scene", "seconds"),
     [
         ("planar3-hold", 3.0),
-        pytest.param(
-            "ridgeback-ur10-drag",
-            60.0,
-            marks=pytest.mark.nightly("app/web/inlet.py", "benchmarks/hostile.py"),
-        ),
+        pytest.param("ridgeback-ur10-drag", 60.0, marks=pytest.mark.nightly("app/", "benchmarks/hostile.py")),
     ],
 )
 def test_a_hostile_user_stops_nothing(scene: str, seconds: float) -> None:

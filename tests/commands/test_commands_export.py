@@ -29,7 +29,10 @@ from lessons.session.distances import objects_of
 from lessons.session.torque import TorqueSession
 from tests.commands.exported import controller_in, exported, needed, replayed, rows_of, told
 
-pytestmark = pytest.mark.nightly("himpc/export", "himpc/tick/kernel", "app/commands/export.py")
+pytestmark = pytest.mark.nightly(
+    *("himpc/", "app/commands/export.py", "app/__main__.py", "robots/settings.py"),
+    *(f"lessons/{part}" for part in ("events", "recording", "runs", "scenes", "session", "settings")),
+)
 """Compiling a controller for export takes a minute of a core."""
 SCENES = ("planar3-conflict", "iiwa14-circle", "iiwa14-hold", "iiwa14-table")
 M_BAR, GAINS, Q, R, LIMITS, ENABLED, ORDER = range(1, 8)

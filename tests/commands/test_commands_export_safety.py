@@ -18,7 +18,10 @@ from lessons.settings.torque import TorqueSettings
 from robots import load_robot
 from tests.commands.exported import controller_in, exported, needed, replayed
 
-pytestmark = pytest.mark.nightly("himpc/export", "himpc/tick/kernel", "app/commands/export.py")
+pytestmark = pytest.mark.nightly(
+    *("himpc/", "app/commands/export.py", "app/__main__.py", "robots/settings.py"),
+    *(f"lessons/{part}" for part in ("events", "recording", "runs", "scenes", "session", "settings")),
+)
 """Compiling a controller for export takes a minute of a core."""
 LIMITS, WEIGHTS, BUDGET = 5, 8, 9
 FEW = ("--ticks", "30")

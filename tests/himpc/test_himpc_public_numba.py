@@ -66,19 +66,13 @@ def on_numba_alone(folder: Path, *arguments: str, **environment: str) -> None:
     assert done.stdout.split() == []
 
 
-COMPILED = pytest.mark.nightly(
-    "himpc/compilation/private", "himpc/compilation/public.py", "himpc/compilation/views.py"
-)
-"""Minutes of a core, as everything is compiled once more."""
+pytestmark = pytest.mark.nightly("himpc/compilation", "himpc/tick/kernel", "himpc/htmpc/kernel")
 
 
 # LLVM's optimizations are switched off: with them, the cascade alone takes three minutes of a core here.
 @pytest.mark.parametrize(
     ("names", "environment"),
-    [
-        pytest.param(("osf", "himpc", "htmpc"), {"NUMBA_OPT": "0"}, marks=COMPILED),
-        (("himpc",), {"NUMBA_DISABLE_JIT": "1"}),
-    ],
+    [(("osf", "himpc", "htmpc"), {"NUMBA_OPT": "0"}), (("himpc",), {"NUMBA_DISABLE_JIT": "1"})],
 )
 def test_the_numbers_are_the_same(
     names: tuple[str, ...], environment: dict[str, str], tmp_path: Path

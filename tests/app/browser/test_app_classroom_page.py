@@ -20,7 +20,10 @@ from lessons.scenes.run_spec import RunSpec
 
 pytestmark = [
     pytest.mark.usefixtures("one_fork_server"),
-    pytest.mark.nightly("app/classes", "app/panels/run/classroom"),
+    pytest.mark.nightly(
+        *(f"app/{part}" for part in ("adapter", "classes", "client", "link", "page", "panels/run", "web")),
+        "browsing/",
+    ),
 ]
 
 

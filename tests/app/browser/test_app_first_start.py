@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[3]
 COMMAND = [sys.executable, "-m", "app", "--port", "0", "--scene", "iiwa14-hold"]
 
 
-@pytest.mark.nightly("app/web/serving.py", "app/link/fork_server.py", "himpc/compilation")
+@pytest.mark.nightly("app/", "browsing/", "himpc/compilation")
 def test_the_page_opens_while_it_is_compiled(browser: Browser, tmp_path: Path) -> None:
     """The command opens a file in the browser, which redirects to the page. The page counts the compiled
     functions and shows a recorded run."""

@@ -25,7 +25,10 @@ from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
-INSIDE = pytest.mark.nightly("app/panels/inside", "lessons/geometry")
+INSIDE = pytest.mark.nightly(
+    *(f"app/{part}" for part in ("adapter", "html", "link", "page", "panels", "worker")),
+    *("browsing/", "lessons/geometry", "lessons/scenes/planar"),
+)
 ARM = 0.08
 """Distance from the arm at which the gizmo of this small arm is grasped, m."""
 

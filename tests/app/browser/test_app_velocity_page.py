@@ -37,7 +37,8 @@ from robots.collision import Ball, Box, Floor
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 MISSIONS = pytest.mark.nightly(
-    "app/page/velocity", "app/panels/velocity", "app/worker/velocity", "himpc/missions"
+    *(f"app/{part}" for part in ("adapter", "html", "link", "page", "panels", "view", "worker")),
+    *("browsing/", "himpc/htmpc", "himpc/missions", "lessons/scenes", "lessons/session", "lessons/settings"),
 )
 
 

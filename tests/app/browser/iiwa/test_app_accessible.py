@@ -20,7 +20,7 @@ _RUN = """(own) => axe.run(
   { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], resultTypes: ["violations"] })"""
 
 
-AXE = pytest.mark.nightly("app/html", "app/panels/widgets")
+AXE = pytest.mark.nightly("app/adapter", "app/html", "app/page", "app/panels", "app/view", "browsing/")
 
 
 @pytest.fixture(scope="module")
