@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from himpc.constants import SLOWEST
+from himpc.constants import MOVING, SLOWEST
 from himpc.controllers.stall_guard import StallGuard
 from himpc.limits import Limits, in_force
 from himpc.limits.avoidance import Avoidance
@@ -180,6 +180,7 @@ class Pairs:
     carried: np.ndarray
     room: float = math.inf
     moves: bool = False
+    moving: float = MOVING
     velocity_margin: float = 0.0
 
 
