@@ -226,3 +226,5 @@ def test_a_joint_has_one_name() -> None:
     assert f"≥ {claims[0].bound:g}" in pictures(
         load_lesson("a-redundant-arm").steps[0], replace(lecture, curves=(curve,) * 3)
     ), "the predicted number of joints is plotted, with its bound"
+    drawn = pictures(load_lesson("two-tasks").steps[1], lecture)
+    assert "≥ 200 mm" in drawn and "≥ 100 mm" not in drawn, "of two bounds the stricter one"

@@ -139,15 +139,14 @@ _SIGNS: dict[bool | None, tuple[str, str, RGB]] = {
 
 
 def _claims(claims: Sequence[Claim], lecture: Lecture) -> str:
-    """Returns the first claim in words, and of the others the numbers, with their words on request."""
+    """Returns the first claim in words, and of the others the verdicts, with their words on request."""
     first, *others = (_claim(claim, k, lecture) for k, claim in enumerate(claims))
     if not others:
         return first
-    numbers = " &nbsp; ".join(
-        f"{_judged(k, lecture)[0]} {_figure(claim, k, lecture)}" for k, claim in enumerate(claims) if k > 0
-    )
+    verdicts = " ".join(_judged(k, lecture)[0] for k in range(1, len(claims)))
     missed = " open" if lecture.phase == "done" and False in lecture.holds[1:] else ""
-    return f"{first}<details{missed}><summary>{numbers}</summary>{''.join(others)}</details>"
+    results = "1 more result" if len(others) == 1 else f"{len(others)} more results"
+    return f"{first}<details{missed}><summary>{results}: {verdicts}</summary>{''.join(others)}</details>"
 
 
 def _judged(place: int, lecture: Lecture) -> tuple[str, str, RGB]:
@@ -259,17 +258,16 @@ def _unit(signal: Signal) -> str:
 
 
 def _bounds(claims: tuple[Claim, ...], signal: Signal) -> list[Bound]:
-    """Returns the bounds in claims about the largest or the last value of the signal itself."""
-    return [
-        Bound(
-            claim.bound,
-            f"{_RELATIONS[claim.relation]} {figure(claim.bound, claim.measure.unit)}",
-            claim.text,
-            claim.measure.after,
-            claim.measure.until,
-        )
-        for claim in claims
-        if claim.measure.signal == signal
-        and not claim.measure.over_ghost
-        and claim.measure.statistic in ("largest", "last")
-    ]
+    """Returns the bounds in claims about the largest or the last value of the signal itself. Of two bounds
+    that hold in the same part of the run, the stricter one is drawn."""
+    bounds: dict[tuple[str, float, float], Bound] = {}
+    for claim in claims:
+        measure, least = claim.measure, claim.relation == "at least"
+        if measure.signal != signal or measure.over_ghost or measure.statistic not in ("largest", "last"):
+            continue
+        label = f"{_RELATIONS[claim.relation]} {figure(claim.bound, measure.unit)}"
+        bound = Bound(claim.bound, label, claim.text, measure.after, measure.until)
+        drawn = bounds.setdefault((claim.relation, bound.after, bound.until), bound)
+        if (bound.value > drawn.value) == least:
+            bounds[claim.relation, bound.after, bound.until] = bound
+    return list(bounds.values())
