@@ -185,8 +185,9 @@ class Hall:
         self.robot, self._sessions = robot, sessions
         self.code = code or "".join(secrets.choice(_LETTERS) for _ in range(_CODE))
         """A part of the phones' address. It gives the right to vote and to watch."""
-        start = robot.choice.exercise
-        self.course = course(None if start is None else start.lesson)
+        self.first = robot.choice.exercise
+        """The step with which the class was started, if any."""
+        self.course = course(None if self.first is None else self.first.lesson)
         """The lessons of the teacher's list."""
         self._state = Gathering(named)
         self._lock = threading.RLock()

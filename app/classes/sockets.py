@@ -215,7 +215,11 @@ class Sockets:
             self._teachers.discard(line)
 
     def _greeting(self) -> View:
-        return {"course": self._hall.course, "address": self._phones_at(""), **self._news()}
+        first = self._hall.first
+        place = None if first is None else [first.lesson, first.place]
+        return {
+            "course": self._hall.course, "first": place, "address": self._phones_at(""), **self._news(),
+        }  # fmt: skip
 
     def _news(self) -> View:
         return {"all": self._hall.everybody(), "class": self._hall.teachers(), "pose": self._hall.pose()}

@@ -9,6 +9,7 @@ import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import viser
@@ -198,6 +199,11 @@ ASK_MOTION = """try {
   localStorage.setItem("%s%s", reduced ? "%s" : "");
 } catch {}""" % (STORED, MOTION, REDUCED)  # noqa: UP031
 """Stores in the browser whether its user asked for less motion."""
+NAME_TAB = """(() => {
+  document.title = "himpc-lab";
+  document.querySelector("link[rel=icon]").href = "data:image/svg+xml," + encodeURIComponent(%s);
+})()""" % json.dumps(files("app.jupyter").joinpath("himpc-lab.svg").read_text("utf-8"))  # noqa: UP031
+"""Gives the browser's tab the program's name and icon; without it they are viser's."""
 ASK_WINDOW = """try {
   localStorage.setItem("%s%s", `${window.innerWidth}x${window.innerHeight}`);
 } catch {}"""

@@ -27,7 +27,7 @@ from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.process import why_not
-from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort, window_size
+from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, NAME_TAB, REDUCED, Comfort, window_size
 from app.page.page import Page
 from app.panels.run.classroom import ClassCard, add_watching
 from app.web.guard import GuardedConnection
@@ -235,6 +235,7 @@ class Visit:
     async def arrive(self) -> None:
         """Starts the visit on viser's loop, unless the visit has ended already. A browser that does not
         answer is treated as a new browser."""
+        private.run_script(self._client, NAME_TAB)
         private.run_script(self._client, ASK_MOTION)
         here = f"himpc-lab-place-{secrets.token_hex(8)}"
         size = f"{here}-window"

@@ -23,6 +23,7 @@ function write(told) {
     fill(ID("lesson"), course.map((each) => [each.name, each.title]));
     if (before) ID("lesson").value = before;
     steps();
+    if (!before) follow(told.first);
   }
   if (told.address) {
     put("qr", told.address.qr);

@@ -16,7 +16,6 @@ from app.link.process import wait_until
 from app.web.server import PageServer, ServerOptions
 from app.web.sessions import STEERING, Classroom
 from browsing.browser_actions import open_page, press, write
-from lessons.scenes.run_spec import RunSpec
 
 pytestmark = [
     pytest.mark.usefixtures("one_fork_server"),
@@ -120,7 +119,7 @@ def test_pages_of_a_class_that_has_ended_say_so(browser: Browser) -> None:
     """Phone and projector lose their connection. The next class at the same address has another code."""
 
     def started(port: int) -> PageServer:
-        choice = SceneChoice(RunSpec("planar3-hold"))
+        choice = SceneChoice.opening("stretched-out")
         return PageServer(choice, ServerOptions(port=port, classroom=True, class_names=True))
 
     first = started(0)
@@ -129,6 +128,7 @@ def test_pages_of_a_class_that_has_ended_say_so(browser: Browser) -> None:
     phone = page_of(browser, f"{first.url}/v/{first.hall.code}", 390, 844, [])
     expect(phone.locator("#question")).to_contain_text("Wait for your teacher")
     expect(lead.get_by_text("Phones cannot reach this address")).to_be_visible()
+    expect(lead.get_by_label("Lesson", exact=True)).to_have_value("stretched-out")  # as the class was started
     first.close()
     expect(phone.get_by_text("The connection is interrupted")).to_be_visible()
     second = started(int(first.url.rpartition(":")[2]))

@@ -65,6 +65,7 @@ def test_the_page_invites_and_holds(page: Page, learner: SimulationClient) -> No
     expect(page.get_by_text("Running", exact=True).first).to_be_visible()
     assert eventually(page, lambda: learner.status is not None and learner.status.t > 0.5)
     assert error(learner, "position") < 1e-3
+    expect(page).to_have_title("himpc-lab")
 
 
 def test_dragging_the_gizmo_moves_the_arm(page: Page, learner: SimulationClient) -> None:
