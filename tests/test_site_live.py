@@ -370,9 +370,9 @@ def test_a_step_in_a_page(live_site: Path, browser: Browser) -> None:
     figure = page.locator("figure.live.open")
     figure.get_by_role("radio").first.check()
     assert page.evaluate("HIMPC.shown.frame?.running ?? false") is False
-    figure.get_by_role("button", name="Run the step").click()
+    figure.get_by_role("button", name="Run this step").click()
     page.wait_for_function("() => document.querySelectorAll('[data-holds=true]').length === 2")
-    assert re.match("Right|It was", figure.locator(".hl-answer").inner_text())
+    assert re.search(r"\(✓ measured: .*\)$", figure.locator(".hl-answer").inner_text())
     state = decode(figure.get_by_label("State code").input_value())
     lesson = load_lesson("inside-the-qp")
     assert (state.lesson, state.step) == ("inside-the-qp", 1)

@@ -96,9 +96,9 @@ export class Figure {
   }
 
   /** Returns the controls of a step: the prediction, the list of claims, and the button that runs the step. */
-  private asking({ asking, scene }: StepData): Element[] {
+  private asking({ asking }: StepData): Element[] {
     return [...element("div", { innerHTML: asking }).children,
-      button(`Run the step (${scene.duration} s)`, () => void this.again())];
+      button("Run this step", () => void this.again())];
   }
 
   private get claims(): HTMLElement[] { return [...this.root.querySelectorAll<HTMLElement>(".hl-claims li")]; }
@@ -119,21 +119,24 @@ export class Figure {
   }
 
   private judge({ claims, prediction }: Verdict): void {
-    const number = (value: number, unit: string): string => (isFinite(value) ? `${Number(value.toPrecision(3))} ${unit}`.trim() : "–");
+    const shown = (words: string): string => words.replace(/ deg\b/, "°").trim();
+    const number = (value: number, unit: string): string => (isFinite(value) ? shown(`${Number(value.toPrecision(3))} ${unit}`) : "–");
     this.claims.forEach((line, k) => {
       const claim = this.step!.claims[k];
       if (!claim.live) return;
       const good = holds(claim, claims[k]), measured = number(claims[k], claim.measure.unit);
       line.dataset.holds = String(good);
-      line.textContent = `${good ? "✓" : "✗"} ${claim.text} Measured: ${measured} (${claim.condition})`;
+      line.title = `must be ${shown(claim.condition)}`;
+      line.textContent = `${good ? "✓" : "✗"} ${claim.text} ${good ? measured : `false ${measured}, ${line.title}`}`;
     });
     const asked = this.step!.prediction, { guess } = this;
     if (asked) {
       const was = number(prediction, asked.measure.unit), { options } = asked;
       const right = options?.findIndex(({ low, high }) => limit(low, -1) <= prediction && prediction < limit(high)) ?? -1;
-      this.root.querySelector(".hl-answer")!.textContent = options ? right < 0 ? "The run gave no measured value." :
-        `${guess === right ? "Right" : "It was"}: ${options[right].text} (${was}).` :
-        guess === null ? `The run gave ${was}.` : `Your prediction was ${number(guess, asked.measure.unit)}; the run gave ${was}.`;
+      const yours = options && guess !== null && guess !== right ? `${options[guess].text} (✗ your answer) · ` : "";
+      this.root.querySelector(".hl-answer")!.textContent = options
+        ? right < 0 ? "The run gave no measured value." : `${yours}${options[right].text} (✓ measured: ${was})`
+        : `${guess === null ? "" : `your guess ${number(guess, asked.measure.unit)} · `}measured ${was}`;
     }
     this.say("The step is over and its claims are judged. Press Run to continue: drag the target, or change the settings.");
   }
@@ -185,8 +188,8 @@ export class Figure {
       if (!raw && frame.restarted) this.panel.aimed(task, AXES.map((axis) => value[axes.indexOf(axis)]));
       this.view?.place(task, value, raw);
     }
-    const slow = frame.running && frame.speed < 0.97 ? ` · simulated time runs at ${frame.speed.toFixed(2)} × real time` : "";
-    this.status.textContent = `t = ${frame.t.toFixed(2)} s${frame.running ? "" : " · paused"}${slow}` +
+    const pace = frame.speed < 0.97 ? `slower than real time (${Number(frame.speed.toPrecision(1))} ×)` : "real time";
+    this.status.textContent = (frame.running ? `Running · ${frame.t.toFixed(1)} s · ${pace}` : `Paused · ${frame.t.toFixed(3)} s`) +
       `${frame.us ? ` · ${Math.round(frame.us)} µs a period` : ""} · binding: ${frame.binding.join(", ") || "nothing"}` +
       (frame.fallback === "solve" ? "" : ` · fallback: ${frame.fallback}`) +
       (frame.lost ? " · out of control: press Reset" : "");

@@ -16,10 +16,10 @@ export class Plots {
   private frames = 0;
 
   constructor(tasks: TaskData[], joints: number) {
-    const errors = tasks.map(({ name, unit, level }) => ({ label: `${name}, ${unit === "m" ? "mm" : "°"}`,
+    const errors = tasks.map(({ name, unit, level }) => ({ label: `${name} [${unit === "m" ? "mm" : "°"}]`,
       stroke: LEVELS[level % 6], factor: unit === "m" ? 1e3 : 180 / Math.PI }));
     const shares = Array.from({ length: joints }, (_, k) => ({ label: `joint ${k + 1}`, stroke: JOINTS[k % 7], factor: 100 }));
-    this.add("Errors of the tasks, mm and °", 1, errors, (_, __, high) => [0, Math.max(LEAST, 1.1 * high)]);
+    this.add("Error per task, mm or °", 1, errors, (_, __, high) => [0, Math.max(LEAST, 1.1 * high)]);
     for (const [k, what] of ["Torques", "Velocities"].entries())
       this.add(`${what}, % of their bounds`, 1 + tasks.length + k * joints, shares,
         (_, low, high) => [Math.min(-110, low), Math.max(110, high)], [100, -100]);
