@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from app.html.markdown import STYLE, rendered, rendered_line, split, word_count
 from app.html.palette import BAD, BOUND, GHOST, GOOD, LEVELS, RGB, css, ink, on
-from app.html.text import badge, bar, block, esc, figure, joints_named
+from app.html.text import badge, bar, block, esc, figure, joints_named, readable
 from app.link.exercise import Lecture, LessonPlace, parts_of, signals_of
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart
 from lessons.course import COURSE
@@ -130,7 +130,6 @@ def _progress(lecture: Lecture) -> str:
     return block(words + ("" if lecture.phase == "done" else bar(share, LEVELS[1])))
 
 
-_RELATIONS = {"at most": "≤", "at least": "≥"}
 _SIGNS: dict[bool | None, tuple[str, str, RGB]] = {
     True: ("✓", "true", GOOD),
     False: ("✗", "false", BAD),
@@ -164,7 +163,7 @@ def _figure(claim: Claim, place: int, lecture: Lecture) -> str:
 
 def _claim(claim: Claim, place: int, lecture: Lecture) -> str:
     sign, word, colour = _judged(place, lecture)
-    wanted = f"must be {_RELATIONS[claim.relation]} {figure(claim.bound, claim.measure.unit)}"
+    wanted = f"must be {readable(claim.condition)}"
     value = _figure(claim, place, lecture)
     measured = {"true": f"<b>{value}</b>", "nothing to measure yet": f"<b>{word}</b>"}.get(
         word, f'<b style="color:{ink(colour)}">{word}</b> {value}, {wanted}'
@@ -265,8 +264,7 @@ def _bounds(claims: tuple[Claim, ...], signal: Signal) -> list[Bound]:
         measure, least = claim.measure, claim.relation == "at least"
         if measure.signal != signal or measure.over_ghost or measure.statistic not in ("largest", "last"):
             continue
-        label = f"{_RELATIONS[claim.relation]} {figure(claim.bound, measure.unit)}"
-        bound = Bound(claim.bound, label, claim.text, measure.after, measure.until)
+        bound = Bound(claim.bound, readable(claim.condition), claim.text, measure.after, measure.until)
         drawn = bounds.setdefault((claim.relation, bound.after, bound.until), bound)
         if (bound.value > drawn.value) == least:
             bounds[claim.relation, bound.after, bound.until] = bound
