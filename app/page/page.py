@@ -353,7 +353,7 @@ class Page:
         direction."""
         from app.view.camera import look
 
-        poses, ready = self.learner.read(lambda block, _: block.poses()), self._built
+        poses, ready = self.learner.read(lambda recording: recording.block.poses()), self._built
         if poses is None or ready is None or not np.isfinite(poses).all():
             return
         base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot may be far from the origin

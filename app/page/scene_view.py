@@ -244,17 +244,17 @@ class SceneView:
 
     def _write(self, moment: Moment) -> None:
         learner, settings = self._learner, self.page.settings
-        found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
-        if found is None or learner.status is None:
+        bound_ticks = learner.read(lambda recording: recording.bound_ticks.copy())
+        if bound_ticks is None or learner.status is None:
             return
         shown = SessionSnapshot(
-            self.page.ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s
+            self.page.ready, settings, moment.status, moment.latest.copy(), bound_ticks * settings.T_s
         )
         now = replace(shown, status=learner.status)
         with self._client.atomic():
             self._playback.update(now)
             self._comfort.follow(now)
-            if found[1] > 0:
+            if np.isfinite(shown.number("t")):  # since the first row
                 self._compare.update(now)
                 self._level.write(shown)
                 self.page.loop.call_soon_threadsafe(unless_removed, self._move.update)

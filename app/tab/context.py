@@ -129,7 +129,7 @@ class PageContext:
         """Poses of all joints and the tip, (J, 7); None if another scene was loaded meanwhile, since
         its robot may have another number of joints."""
         learner = self.learner
-        return learner.read(lambda block, _: block.poses() if learner.ready is self.ready else None)
+        return learner.read(lambda run: run.block.poses() if learner.ready is self.ready else None)
 
     def poses_or_still(self) -> np.ndarray:
         """Returns `poses`, or identity poses if no poses are known, for objects that are built now and
