@@ -126,7 +126,7 @@ class SceneView:
             self._comfort.add_switch(gui)
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS):  # hotkeys also for levels that may be added later
-            add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
+            add_command(gui, f"Level {place + 1} on or off", key, partial(self._level.toggle, place))
         with plots.add_tab("Errors"):
             self._level.add_plots()
         with plots.add_tab("Joints"):
@@ -157,11 +157,6 @@ class SceneView:
                 plots.dock_left()
                 plots.set_width(_SIDE)
         self.covered = above, below
-
-    def _toggle(self, place: int) -> None:
-        event = self._level.toggle(place)
-        if event is not None:
-            self.page.post(event)
 
     def _build_scene(self, scene: viser.SceneApi) -> None:
         # Shadows triple the rendering time of a frame, which matters on a laptop or a phone.

@@ -27,7 +27,6 @@ from app.view.robot import CoverView, JointTurns, LinkPicker, RobotView
 from app.view.surroundings import ContactView, WorldView
 from app.view.targets import Movable, Targets, draggable
 from app.view.trails import Trails
-from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 
 
@@ -129,8 +128,8 @@ class TorqueView:
 
     # ---------------------------------------------------------------- events out
 
-    def toggle(self, place: int) -> Set | None:
-        return self._tasks.toggle(place)
+    def toggle(self, place: int) -> None:
+        self._tasks.toggle(place)
 
     def movables(self) -> list[Movable]:
         return [*(each for hand in self._hands for each in hand.movables()), *self._targets.movables()]
