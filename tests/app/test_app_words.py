@@ -266,7 +266,7 @@ def test_poses_of_another_scene_are_none_of_this_page(monkeypatch: pytest.Monkey
     ready = SimpleNamespace(robot=robot)
     mock = MagicMock()
     monkeypatch.setattr("app.tab.context.InView", mock)  # it sends a script to the browser
-    made: Any = (mock, learner, ready, {}, mock, False, mock, mock, None, mock)
+    made: Any = (mock, learner, ready, {}, mock)
     page = PageContext(*made)
     assert page.poses() is None
     assert page.poses_or_still().shape == (robot.n + 1, 7)

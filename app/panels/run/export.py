@@ -116,7 +116,7 @@ _DOWNLOAD = block(
 def add_hand_in(page: PageContext) -> None:
     """Adds the folder with which learners hand in their progress. The text to hand in is written when the
     learner asks for it, on one of viser's threads."""
-    gui, learner, notebook = page.gui, page.learner, page.notebook
+    gui, learner, notebook = page.gui, page.learner, page.visitor.notebook
     with gui.add_folder("Hand in your progress", expand_by_default=False):
         told = f" The text names your account, <b>{escape(notebook.account)}</b>." if notebook.account else ""
         gui.add_html(block((_SIGNED if notebook.signs else _NOT_SIGNED) + told))
