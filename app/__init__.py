@@ -15,8 +15,8 @@ The path of a row of telemetry from the tick to the browser:
 1. A tick of the session returns the row; `worker/simulation` writes it into the shared memory of `link/ring`.
 2. The page's thread (`page/page`, 30 Hz) gets the time to show from `client/moment`, which reads the new
    rows.
-3. `client/recording` keeps the minimum, the maximum and the last value of each column in each interval of
-   time.
+3. `client/recording` keeps the minimum and the maximum of each column in each interval of time, and a hundred
+   rows per second exactly.
 4. `page/scene_view` gives the moment to `page/torque` or `page/velocity`, which draws the panels' curves.
 5. viser sends the changes. Data that need not be sent every tick (settings, notices, the progress of a
    lesson) are sent ten times a second as a `Status` over `link/process`; `client/simulation` receives

@@ -30,7 +30,7 @@ import msgspec
 import numpy as np
 from websockets.exceptions import ConnectionClosed
 
-from app.client.recording import History
+from app.client.recording import Recording
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.ring import Block
@@ -130,10 +130,11 @@ class Judge:
             if learner.lecture is not None:
                 self.found.lessons[learner.lecture.exercise.lesson] = None
         for learner in self._server.sessions.learners[:1]:
-            learner.read(lambda block, history: self._judge(learner, block, history))  # noqa: B023
+            learner.read(lambda recording: self._judge(learner, recording))  # noqa: B023
             self._is_alive(learner)
 
-    def _judge(self, learner: SimulationClient, block: Block, history: History) -> None:
+    def _judge(self, learner: SimulationClient, recording: Recording) -> None:
+        block = recording.block
         if block is not self._block:
             self._block, self._seen = block, 0
         start, rows = block.since(self._seen)
@@ -141,7 +142,7 @@ class Judge:
         self.found.rows += len(rows)
         if not len(rows):
             return
-        fields, where = history.layout.fields, _where(learner)
+        fields, where = recording.layout.fields, _where(learner)
         for name in ("q", "v", "tau"):
             if not np.isfinite(rows[:, fields[name]]).all():
                 self.found.blame(f"{name} is not a number in {where}")

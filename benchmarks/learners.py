@@ -111,7 +111,7 @@ def of_client(said: list[dict[str, Any]], client: int) -> dict[str, float]:
 
 def simulated(learner: SimulationClient) -> float:
     """Returns the simulated time, s, from the memory that is shared with the simulation."""
-    found = learner.read(lambda block, _: block.moment()[0])
+    found = learner.read(lambda recording: recording.block.moment()[0])
     return 0.0 if found is None else found
 
 

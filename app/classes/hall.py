@@ -354,7 +354,7 @@ class Hall:
     def pose(self) -> View | None:
         """Returns the pose of the teacher's robot at this instant; None while there is no robot."""
         ready = self.robot.ready
-        moment = self.robot.read(lambda block, _: block.moment())
+        moment = self.robot.read(lambda recording: recording.block.moment())
         if ready is None or moment is None or not np.isfinite(moment[1]).all():
             return None
         return pose_of(*moment)

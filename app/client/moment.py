@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.client.recording import PlotWindow
-from app.client.simulation import Simulation
+from app.client.recording import PlotWindow, Recording
 from app.client.simulation_client import GhostClient, SimulationClient
 from app.link.messages import Status
 
@@ -78,11 +77,11 @@ def moment_of(learner: SimulationClient, past: float | None, curves: bool = True
     # Within `read` no other scene can be loaded: all data belong to one scene.
     shown = t
     found = learner.read(
-        lambda _, history: (
-            learner.tape.at(shown),
-            history.window(shown),
-            history.latest if past is None else history.at(shown),
-            _way(learner, shown, curves),
+        lambda recording: (
+            recording.frame(shown),
+            recording.window(shown),
+            recording.latest if past is None else recording.row(shown),
+            _way(recording, shown, curves),
         )
     )
     if found is None:
@@ -103,11 +102,11 @@ def moment_of(learner: SimulationClient, past: float | None, curves: bool = True
 
 
 def _ghost_state(ghost: GhostClient, t: float, ways: bool) -> GhostState | None:
-    found = ghost.read(lambda _, history: (ghost.tape.at(t), history.window(t), _way(ghost, t, ways)))
+    found = ghost.read(lambda recording: (recording.frame(t), recording.window(t), _way(recording, t, ways)))
     return None if found is None or found[0] is None else GhostState(found[0].poses, found[1], found[2])
 
 
-def _way(simulation: Simulation, t: float, wanted: bool) -> np.ndarray:
+def _way(recording: Recording, t: float, wanted: bool) -> np.ndarray:
     if not wanted:
         return np.zeros((0, 0, 7))
-    return np.array([frame.poses for frame in simulation.tape.between(t - TRACE_SECONDS, t)])
+    return np.array([frame.poses for frame in recording.frames(t - TRACE_SECONDS, t)])

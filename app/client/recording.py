@@ -1,10 +1,9 @@
-"""What a page keeps of a run: the last minute for plots (short peaks are kept, and points that nobody can see
-are left out) and for looking back, exact rows for export, and running sums over all ticks."""
+"""What a page keeps of a run: the last minute as the simulation sent it, older rows for files, and sums over
+all ticks."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -18,8 +17,27 @@ from app.link.ring import Block
 if TYPE_CHECKING:
     from himpc.telemetry import Layout
 
+KEPT = 60.0
+"""Simulated time, s, that the page can show again."""
+RATE = 100.0
+"""Number of rows that are stored per simulated second."""
 FRAMES = 30.0
 """Number of frames that are stored per simulated second."""
+MOST = 12_000
+"""Largest number of rows that are stored of a whole run. Of a longer run, every second, fourth, … row is
+stored."""
+WINDOW = 8.0
+"""Simulated time, s, in the plots."""
+BUCKETS = 160
+"""Number of buckets in a window."""
+
+_MINUTE = round(KEPT * RATE)
+_SPAN = WINDOW / BUCKETS
+_SLOTS = round((KEPT + WINDOW) / _SPAN)
+_HELD = round(1.0 / _SPAN)
+"""Largest number of buckets without a row (slow controller) that are filled from the bucket before them."""
+_AGES = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
+_LEVELS = (2, 4, 8, 16, 32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +49,96 @@ class Frame:
     status: Status | None
 
 
-class PoseHistory:
-    """Frames in order of time, for at most one minute of simulated time. A reset deletes them."""
+class Recording:
+    """The recording of a run, from which any moment of the last minute is shown again. It consists of
 
-    def __init__(self) -> None:
+    - frames, the poses with the report at their time, at FRAMES;
+    - rows exactly as the simulation wrote them, at RATE; of the time before the last minute, at first all of
+      these rows, later every second, fourth, … of them;
+    - for each bucket of simulated time, the minimum and the maximum of each column in the order of their
+      times, as the plots also show peaks that are shorter than 1/RATE.
+
+    If the controller is slower than the buckets, some buckets have no row; a row is then valid until the next
+    row. Buckets are aligned to simulated time, so that curves scroll without shimmering, and two robots on
+    one clock have the same buckets. Each row is read only once, whatever span of time the plots show. A reset
+    sets the time back and deletes all, since a jump would look like a motion.
+
+    Attributes:
+        block: the shared memory that is recorded.
+        latest: the newest row.
+        bound_ticks: (n, number of constraints), the ticks since the last reset that each joint spent at the
+            bound of each constraint.
+        statistics: the sums over all ticks.
+    """
+
+    def __init__(self, block: Block, layout: Layout) -> None:
+        from himpc.limits import CONSTRAINTS
+
+        joints = layout.fields["at_bound"].stop - layout.fields["at_bound"].start
+        self.block, self.layout = block, layout
+        self.latest = np.full(layout.size, np.nan)
+        self.bound_ticks = np.zeros((joints, len(CONSTRAINTS)))
+        self._count = 0  # number of rows of the block that were read or lost
+        self._t = layout.fields["t"].start
         self._frames: list[Frame] = []
+        # These arrays are allocated once. A separate array per row would live for minutes among arrays that
+        # live for an instant, and would fragment the memory. The arrays are not filled, as the system
+        # provides a memory page at the first write, and most scenes are shown for less than a minute.
+        self._rows = np.empty((_MINUTE, layout.size))  # a ring
+        self._older = np.empty((MOST, layout.size))
+        self._pairs = np.empty((_SLOTS, 2, layout.size))  # a ring, valid where `_numbers` has the bucket
+        self._bits = np.zeros((_SLOTS, joints), np.int64)
+        self._numbers = np.full(_SLOTS, -1)
+        self._first = np.full(layout.size, np.nan)  # the open bucket's first row
+        self._begin()
+
+    def _begin(self) -> None:
+        self.bound_ticks[:] = 0
+        self.statistics = RunStatistics(self.layout)
+        self._stored = 0  # number of rows that were stored at RATE
+        self._every = 1  # one of this many rows becomes an older row
+        self._mark = -1
+        self._numbers[:] = -1
+        self._bucket = -1
+
+    def under(self, block: Block, layout: Layout) -> Recording:
+        """Returns the same recording in the layout of another stack, with which the run continues in another
+        block. The sums begin anew."""
+        from himpc.telemetry import relaid
+
+        def moved(rows: np.ndarray) -> np.ndarray:
+            flat = rows.reshape(-1, self.layout.size)
+            return relaid(flat, self.layout, layout).reshape(*rows.shape[:-1], layout.size)
+
+        new = Recording(block, layout)
+        new.latest, new._first = moved(self.latest), moved(self._first)
+        known, stored, older = self._numbers >= 0, min(self._stored, _MINUTE), self._older_count
+        new._pairs[known] = moved(self._pairs[known])
+        new._rows[:stored], new._older[:older] = moved(self._rows[:stored]), moved(self._older[:older])
+        for name in ("bound_ticks", "_frames", "_stored", "_every", "_mark", "_numbers", "_bits", "_bucket"):
+            setattr(new, name, getattr(self, name))
+        return new
+
+    # ---------------------------------------------------------------- recording
+
+    def look(self, status: Status | None, rows: bool = True) -> float:
+        """Records what is new in the block, and returns the simulated time, s. status: the newest report;
+        rows: whether to read the telemetry too; otherwise one of the next calls reads it."""
+        t, poses = self.block.moment()
+        if rows:
+            self.pull()  # read after the moment, so that the rows reach up to it
+        self.add(Frame(t, poses, status))
+        return t
+
+    def pull(self) -> None:
+        """Records the rows that were written since the last call."""
+        start, rows = self.block.since(self._count)
+        if len(rows):
+            self._count = start + len(rows)
+            self.take(rows)
 
     def add(self, frame: Frame) -> None:
-        """Adds the newest frame. If the previous frame is closer than 1/FRAMES to the frame before it, the
+        """Records the newest frame. If the previous frame is closer than 1/FRAMES to the frame before it, the
         newest frame replaces the previous frame. Thus slow motion needs no more memory."""
         frames = self._frames
         if frames and frame.t < frames[-1].t:
@@ -49,8 +149,67 @@ class PoseHistory:
         # The limit is a time, not a number of frames, as a busy machine gives fewer frames per second.
         del frames[: self._index(frame.t - KEPT)]
 
-    def clear(self) -> None:
-        self._frames.clear()
+    def take(self, rows: np.ndarray) -> None:
+        """Records rows, (k, size) in order of time. A time that is earlier than the one before it begins a
+        new run."""
+        turns = np.flatnonzero(np.diff(rows[:, self._t], prepend=self.latest[self._t]) < 0)
+        if turns.size:
+            self._begin()
+            rows = rows[turns[-1] :]
+        times = rows[:, self._t]
+        bits = rows[:, self.layout.fields["at_bound"]]
+        bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
+        each = 1 << np.arange(self.bound_ticks.shape[1])
+        self.bound_ticks += np.count_nonzero(bits[:, :, None] & each, axis=0)
+        marks = np.floor(times * RATE + 1e-6).astype(np.int64)
+        for k in np.flatnonzero(np.diff(marks, prepend=self._mark)):
+            self._store(rows[k])
+        self._mark = int(marks[-1])
+        buckets = np.floor(times / _SPAN + 1e-6).astype(np.int64)
+        starts = np.flatnonzero(np.diff(buckets, prepend=buckets[0] - 1)).tolist()
+        for start, end in pairwise([*starts, len(rows)]):
+            self._hold(int(buckets[start]))
+            self._merge(int(buckets[start]), rows[start:end], bits[start:end])
+            self.latest = rows[end - 1]
+        self.latest = self.latest.copy()  # as a view, it would keep all rows in memory
+        self.statistics.append_rows(rows)
+
+    def _store(self, row: np.ndarray) -> None:
+        """Stores a row in the ring; the row that it replaces there becomes one of the older rows."""
+        slot, old = self._stored % _MINUTE, self._stored - _MINUTE
+        if old >= 0 and old % self._every == 0:
+            self._older[old // self._every] = self._rows[slot]
+        self._rows[slot] = row
+        self._stored += 1
+        if self._stored == MOST * self._every:
+            self._older[: MOST // 2] = self._older[::2].copy()
+            self._every *= 2
+
+    def _hold(self, until: int) -> None:
+        """Fills the buckets between the newest bucket and the bucket `until` with the newest row."""
+        before = self._bucket % _SLOTS
+        if self._bucket < 0 or until - self._bucket > _HELD:
+            return
+        for bucket in range(self._bucket + 1, until):
+            slot = bucket % _SLOTS
+            self._numbers[slot], self._bits[slot] = bucket, self._bits[before]
+            self._pairs[slot] = self.latest
+
+    def _merge(self, bucket: int, rows: np.ndarray, bits: np.ndarray) -> None:
+        slot = bucket % _SLOTS
+        pair, low, high = self._pairs[slot], rows.min(axis=0), rows.max(axis=0)
+        if self._numbers[slot] != bucket:
+            self._numbers[slot] = bucket
+            self._bits[slot] = 0
+            self._first = rows[0].copy()
+        else:
+            low, high = np.fmin(pair.min(axis=0), low), np.fmax(pair.max(axis=0), high)
+        rising = rows[-1] >= self._first
+        pair[0], pair[1] = np.where(rising, low, high), np.where(rising, high, low)
+        self._bits[slot] |= np.bitwise_or.reduce(bits, axis=0)
+        self._bucket = bucket
+
+    # ---------------------------------------------------------------- looking back
 
     @property
     def span(self) -> tuple[float, float]:
@@ -60,9 +219,9 @@ class PoseHistory:
         last = self._frames[-1].t
         return max(self._frames[0].t, last - KEPT), last
 
-    def at(self, t: float) -> Frame | None:
-        """Returns the frame at time t: poses interpolated between the two nearest frames, with the report of
-        the earlier frame."""
+    def frame(self, t: float) -> Frame | None:
+        """Returns the frame at time t (s): poses interpolated between the two nearest frames, with the report
+        of the earlier frame."""
         if not self._frames:
             return None
         k = self._index(t)
@@ -73,12 +232,48 @@ class PoseHistory:
         share = (t - before.t) / (after.t - before.t)
         return Frame(t, _between(before.poses, after.poses, share), before.status)
 
-    def between(self, start: float, end: float) -> Iterator[Frame]:
+    def frames(self, start: float, end: float) -> list[Frame]:
         """Returns the frames from `start` to `end`, s."""
-        return iter(self._frames[self._index(start) : self._index(end)])
+        return self._frames[self._index(start) : self._index(end)]
 
     def _index(self, t: float) -> int:
         return bisect_right(self._frames, t, key=lambda frame: frame.t)
+
+    def row(self, t: float) -> np.ndarray:
+        """Returns the newest row at time t (s), as precisely as rows are stored."""
+        if not t < self.latest[self._t]:
+            return self.latest
+        stored = self._in_ring
+        k = bisect_right(stored, t + 1e-6, key=lambda k: self._rows[k % _MINUTE, self._t])
+        return self._rows[stored[max(k - 1, 0)] % _MINUTE].copy()
+
+    def window(self, until: float | None = None) -> PlotWindow:
+        """Returns the curves for the plots up to time `until` (s); None: the present time."""
+        end = self._bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
+        return PlotWindow(self, end)
+
+    def minute(self) -> np.ndarray:
+        """Returns the rows of the last minute at RATE, (k, size)."""
+        rows = self._ring()
+        return rows[rows[:, self._t] > self.latest[self._t] - KEPT]
+
+    def whole(self) -> np.ndarray:
+        """Returns the rows since the last reset, evenly spaced, as densely as MOST allows, (k, size)."""
+        due = -self._in_ring.start % self._every
+        return np.vstack([self._older[: self._older_count], self._ring()[due :: self._every]])
+
+    def _ring(self) -> np.ndarray:
+        return self._rows[np.array(self._in_ring, int) % _MINUTE]
+
+    @property
+    def _in_ring(self) -> range:
+        """The numbers of the rows in the ring, counted since the last reset."""
+        return range(max(0, self._stored - _MINUTE), self._stored)
+
+    @property
+    def _older_count(self) -> int:
+        """The number of older rows that are stored."""
+        return -(-self._in_ring.start // self._every)
 
 
 def _between(before: np.ndarray, after: np.ndarray, share: float) -> np.ndarray:
@@ -91,165 +286,20 @@ def _between(before: np.ndarray, after: np.ndarray, share: float) -> np.ndarray:
     return found
 
 
-WINDOW = 8.0  # s of simulated time in the plots
-BUCKETS = 160  # number of buckets in a window
-KEPT = 60.0  # s of simulated time that the page can show again
-_SPAN = WINDOW / BUCKETS
-_AGES = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
-_SLOTS = round((KEPT + WINDOW) / _SPAN)
-_HELD = round(
-    1.0 / _SPAN
-)  # largest number of buckets without a row (slow controller) that are filled from the bucket before them
-
-_LEVELS = (2, 4, 8, 16, 32)
-
-
-class History:
-    """Stores for each bucket of simulated time the minimum and the maximum of each column, in the order of
-    their times, and the bucket's last row.
-
-    If the controller is slower than the buckets, some buckets have no row; a row is then valid until the next
-    row. Buckets are aligned to simulated time, so that curves scroll without shimmering, and two robots on
-    one clock have the same buckets. Each row is read only once, whatever span of
-    time the plots show. A reset sets the time back and
-    clears the curves, since a jump would look like a motion.
-
-    Attributes:
-        score: the figures of the run.
-        rows: exact rows, for export.
-    """
-
-    def __init__(self, block: Block, layout: Layout, rows: RowHistory | None = None) -> None:
-        """rows: the exact rows so far, of a run that continues with another stack."""
-        self.layout = layout
-        self.score, self.rows = RunStatistics(layout), rows or RowHistory(layout)
-        self.latest = np.full(layout.size, np.nan)
-        from himpc.limits import CONSTRAINTS
-
-        joints = layout.fields["at_bound"].stop - layout.fields["at_bound"].start
-        self.bound_ticks = np.zeros((joints, len(CONSTRAINTS)))
-        self.bucket = -1
-        self._block = block
-        self._t = layout.fields["t"].start
-        self._before = self._count = 0
-        self._numbers = np.full(_SLOTS, -1)
-        # The memory is not initialised, see `RowHistory`: a slot is valid only if `_numbers` has its bucket.
-        self._pairs = np.empty((_SLOTS, 2, layout.size))
-        self._lasts = np.empty((_SLOTS, layout.size))
-        self._bits = np.zeros((_SLOTS, len(self.bound_ticks)), np.int64)
-        self._first = np.full(layout.size, np.nan)  # the open bucket's first row
-
-    def under(self, block: Block, layout: Layout) -> History:
-        """Returns the same curves in the layout of another stack; the run continues with that stack."""
-        from himpc.telemetry import relaid
-
-        def moved(rows: np.ndarray) -> np.ndarray:
-            flat = rows.reshape(-1, self.layout.size)
-            return relaid(flat, self.layout, layout).reshape(*rows.shape[:-1], layout.size)
-
-        new = History(block, layout, self.rows.under(layout))
-        new.latest, new._first = moved(self.latest), moved(self._first)
-        known = self._numbers >= 0
-        new._pairs[known], new._lasts[known] = moved(self._pairs[known]), moved(self._lasts[known])
-        new.bound_ticks, new.bucket = self.bound_ticks, self.bucket
-        new._numbers, new._bits = self._numbers, self._bits
-        new._before = self.count
-        return new
-
-    @property
-    def count(self) -> int:
-        """Number of rows read or lost so far."""
-        return self._before + self._count
-
-    def pull(self) -> int:
-        """Reads the rows that were written since the last call; returns their number."""
-        start, rows = self._block.since(self._count)
-        if not len(rows):
-            return 0
-        self._count = start + len(rows)
-        before = np.concatenate([[self.latest[self._t]], rows[:-1, self._t]])
-        turns = np.flatnonzero(rows[:, self._t] < before)
-        if turns.size:
-            self.forget()
-        self._take(rows[turns[-1] :] if turns.size else rows)
-        return len(rows)
-
-    def _take(self, rows: np.ndarray) -> None:
-        self.latest = rows[-1].copy()  # a copy, as a view would keep all rows in memory
-        bits = rows[:, self.layout.fields["at_bound"]]
-        bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
-        for k in range(self.bound_ticks.shape[1]):
-            self.bound_ticks[:, k] += np.count_nonzero(bits & (1 << k), axis=0)
-        numbers = np.floor(rows[:, self._t] / _SPAN + 1e-6).astype(np.int64)
-        starts = np.flatnonzero(np.diff(numbers, prepend=numbers[0] - 1)).tolist()
-        for start, end in pairwise([*starts, len(rows)]):
-            bucket = int(numbers[start])
-            self._hold(bucket)
-            slot = self._merge(bucket, rows[start:end])
-            self._bits[slot] |= np.bitwise_or.reduce(bits[start:end], axis=0)
-        self.score.append_rows(rows)
-        self.rows.take(rows)
-
-    def _hold(self, until: int) -> None:
-        """Fills the buckets between the newest bucket and the bucket `until` with the last values of the
-        newest bucket."""
-        before = self.bucket % _SLOTS
-        if self.bucket < 0 or until - self.bucket > _HELD:
-            return
-        for bucket in range(self.bucket + 1, until):
-            slot = bucket % _SLOTS
-            self._numbers[slot], self._bits[slot] = bucket, self._bits[before]
-            self._pairs[slot] = self._lasts[slot] = self._lasts[before]
-
-    def _merge(self, bucket: int, rows: np.ndarray) -> int:
-        slot = bucket % _SLOTS
-        if self._numbers[slot] != bucket:
-            self._numbers[slot] = bucket
-            self._bits[slot] = 0
-            self._first = rows[0].copy()
-            low, high = rows.min(axis=0), rows.max(axis=0)
-        else:
-            pair = self._pairs[slot]
-            low = np.fmin(pair.min(axis=0), rows.min(axis=0))
-            high = np.fmax(pair.max(axis=0), rows.max(axis=0))
-        rising = rows[-1] >= self._first
-        self._pairs[slot, 0] = np.where(rising, low, high)
-        self._pairs[slot, 1] = np.where(rising, high, low)
-        self._lasts[slot] = rows[-1]
-        self.bucket = bucket
-        return slot
-
-    def window(self, until: float | None = None) -> PlotWindow:
-        """Returns the curves for the plots up to the simulated time `until` (s); None: the present time."""
-        end = self.bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
-        return PlotWindow(self, end)
-
-    def at(self, t: float) -> np.ndarray:
-        """Returns the newest row at the simulated time t (s), as precisely as the history stores it."""
-        bucket = int(np.floor(t / _SPAN - 1e-6))
-        slot = bucket % _SLOTS
-        return self._lasts[slot].copy() if bucket >= 0 and self._numbers[slot] == bucket else self.latest
-
-    def forget(self) -> None:
-        """Deletes all data; used after a reset."""
-        self._numbers[:] = -1
-        self.bucket = -1
-        self.bound_ticks[:] = 0
-
-
 class PlotWindow:
     """The curves of the plots at one moment: BUCKETS pairs of values, oldest first."""
 
-    def __init__(self, history: History, end: int) -> None:
+    def __init__(self, recording: Recording, end: int) -> None:
         """end: number of the newest bucket, counted from the start of the run."""
-        self.layout = history.layout
+        self.layout = recording.layout
         self.first = 2 * (end - BUCKETS + 1)
         """Number of the oldest value; it may be negative."""
         wanted = np.arange(end - BUCKETS + 1, end + 1)
-        wanted[(wanted > history.bucket) & (wanted <= history.bucket + _HELD)] = history.bucket
+        newest = recording._bucket
+        wanted[(wanted > newest) & (wanted <= newest + _HELD)] = newest
         self._slots = wanted % _SLOTS
-        self._known = (history._numbers[self._slots] == wanted) & (wanted >= 0)
-        self._pairs, self._bits = history._pairs, history._bits
+        self._known = (recording._numbers[self._slots] == wanted) & (wanted >= 0)
+        self._pairs, self._bits = recording._pairs, recording._bits
 
     def columns(self, which: slice) -> np.ndarray:
         """Returns the values of some columns, (2 · BUCKETS, k); NaN where nothing was recorded."""
@@ -342,27 +392,21 @@ _DECADES = 8  # from 1 µs
 
 
 class RunStatistics:
-    """Adds up portions of rows in their order; `clear` begins a new run."""
+    """Adds up the rows of a run, portion by portion in their order."""
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
-        self.clear()
-
-    def clear(self) -> None:
         self._ticks = 0
         self._squares = {task.name: 0.0 for task in self._layout.tasks}
         self._known = dict.fromkeys(self._squares, 0)
         self._share = 0.0
         self._times = np.zeros(_PER_DECADE * _DECADES, np.int64)
         self._unsolved = 0
-        self._t = -1.0
-        self._first = 0.0
+        self._first = self._t = 0.0
 
     def append_rows(self, rows: np.ndarray) -> None:
         fields = self._layout.fields
         t = rows[:, fields["t"].start]
-        if t[0] < self._t:
-            self.clear()
         if self._ticks == 0:
             self._first = float(t[0])
         self._t = float(t[-1])
@@ -408,76 +452,3 @@ class RunStatistics:
         """Returns the time in ms below which the given share of the control steps stayed."""
         index = int(np.searchsorted(np.cumsum(self._times), share * self._ticks))
         return 1e-3 * float(10 ** ((index + 0.5) / _PER_DECADE))
-
-
-RATE = 100.0
-"""Number of rows that are stored per simulated second."""
-MOST = 12_000
-"""Largest number of rows that are stored of a whole run. Of a longer run, every second, fourth, … row is
-stored."""
-
-
-class RowHistory:
-    """The rows since the last reset: the last minute at RATE, and the whole run as densely as MOST allows."""
-
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
-        self._t = layout.fields["t"].start
-        # Two blocks are allocated once. A separate array per row would live for minutes among arrays that
-        # live for an instant, and would fragment the memory. The blocks are not filled, as the system
-        # provides a memory page at the first write, and most scenes are shown for less than a minute.
-        self._recent = np.empty((round(KEPT * RATE), layout.size))
-        self._whole = np.empty((MOST, layout.size))
-        self._clear()
-
-    def _clear(self) -> None:
-        self._every = 1
-        self._kept = 0  # number of rows that were stored at RATE
-        self._thinned = 0  # number of rows in `_whole`
-        self._mark = -1
-        self._last = -np.inf
-
-    def under(self, layout: Layout) -> RowHistory:
-        """Returns the same rows in the layout of another stack; the run continues with that stack."""
-        from himpc.telemetry import relaid
-
-        new = RowHistory(layout)
-        for rows, before, count in (
-            (new._recent, self._recent, min(self._kept, len(self._recent))),
-            (new._whole, self._whole, self._thinned),
-        ):
-            rows[:count] = relaid(before[:count], self.layout, layout)
-        new._every, new._kept, new._thinned = self._every, self._kept, self._thinned
-        new._mark, new._last = self._mark, self._last
-        return new
-
-    def take(self, rows: np.ndarray) -> None:
-        """Adds rows in order of time. A time that is earlier than the last one begins a new run."""
-        times = rows[:, self._t]
-        if times[0] < self._last:
-            self._clear()
-        self._last = float(times[-1])
-        marks = np.floor(times * RATE + 1e-6).astype(np.int64)
-        for k in np.flatnonzero(np.diff(marks, prepend=self._mark)):
-            self._keep(rows[k])
-        self._mark = int(marks[-1])
-
-    def _keep(self, row: np.ndarray) -> None:
-        self._recent[self._kept % len(self._recent)] = row
-        if self._kept % self._every == 0:
-            self._whole[self._thinned] = row
-            self._thinned += 1
-            if self._thinned == MOST:
-                self._thinned = (MOST + 1) // 2
-                self._whole[: self._thinned] = self._whole[::2].copy()
-                self._every *= 2
-        self._kept += 1
-
-    def recent(self) -> np.ndarray:
-        """Returns the rows of the last minute, (k, size)."""
-        end = self._kept
-        return self._recent[np.arange(max(0, end - len(self._recent)), end) % len(self._recent)]
-
-    def whole(self) -> np.ndarray:
-        """Returns the rows since the last reset, (k, size)."""
-        return self._whole[: self._thinned].copy()

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeVar
 
-from app.client.recording import Frame, History, PoseHistory, RowHistory, RunFigures
+from app.client.recording import Recording, RunFigures
 from app.link.fork_server import FIRST_PATIENCE
 from app.link.messages import Command, Loading, LoadRefused, Ready, Report, SimulationFailed, Status
 from app.link.process import Process, Spares
@@ -80,13 +80,11 @@ class Simulation(ABC):
         """The state code of the setting, as the process reported it; "" if there is none."""
         self.failure: str | None = None
         self.changed = 0
-        self.tape = PoseHistory()
+        self.recording: Recording | None = None
         self._refusals: list[str] = []
         self._notices: list[str] = []
         self._spares = spares
         self._lock = threading.RLock()
-        self._block: Block | None = None
-        self._history: History | None = None
         self._closed = False
         self._loading = False
         self._next_complaint = 0.0
@@ -103,16 +101,10 @@ class Simulation(ABC):
         process.listen(hear)
 
     @property
-    def record(self) -> RowHistory | None:
-        """The exact rows of the run; None before the first scene and after the end."""
-        history = self._history
-        return None if history is None else history.rows
-
-    @property
     def figures(self) -> RunFigures | None:
         """The figures of the run; None before the first row."""
-        history = self._history
-        return None if history is None else history.score.result()
+        recording = self.recording
+        return None if recording is None else recording.statistics.result()
 
     @property
     def pid(self) -> int | None:
@@ -174,21 +166,19 @@ class Simulation(ABC):
         """Handles the other effects of a report, on the thread of the process that sent it."""
 
     def _enter(self, ready: Ready) -> None:
-        history = self._history
-        block = Block.for_robot(ready.robot, ready.layout.size, ready.block)
-        again = None if history is None or not ready.again else history.under(block, ready.layout)
+        before, block = self.recording, Block.for_robot(ready.robot, ready.layout.size, ready.block)
+        again = None if before is None or not ready.again else before.under(block, ready.layout)
         self._free()
         self.ready, self.settings = ready, ready.settings
-        self._block, self._history = block, again or History(block, ready.layout)
+        self.recording = again or Recording(block, ready.layout)
         if not ready.again:
             self.status, self.code = None, ""
-            self.tape.clear()
         self.changed += 1
 
     def _free(self) -> None:
-        block, self._block, self._history = self._block, None, None
-        if block is not None:
-            block.close()
+        recording, self.recording = self.recording, None
+        if recording is not None:
+            recording.block.close()
 
     def take_messages(self) -> tuple[list[str], list[str]]:
         """Returns (refusals, notices) that arrived since the last call."""
@@ -205,26 +195,15 @@ class Simulation(ABC):
 
     # ---------------------------------------------------------------- telemetry
 
-    def read(self, look: Callable[[Block, History], T]) -> T | None:
-        """Calls `look` and returns its result; the shared memory cannot be freed meanwhile. Returns None
+    def read(self, look: Callable[[Recording], T]) -> T | None:
+        """Calls `look` and returns its result; the recorded block cannot be freed meanwhile. Returns None
         before the first scene."""
         with self._lock:
-            if self._block is None or self._history is None:
-                return None
-            return look(self._block, self._history)
+            return None if self.recording is None else look(self.recording)
 
     def look(self, rows: bool = True) -> float | None:
-        """Reads new data, stores them for a later replay, and returns the simulated time, s. rows: whether to
-        read the telemetry too; otherwise one of the next calls reads it."""
-
-        def take(block: Block, history: History) -> float:
-            t, poses = block.moment()
-            if rows:
-                history.pull()  # read after the moment, so that the rows reach up to it
-            self.tape.add(Frame(t, poses, self.status))
-            return t
-
-        return self.read(take)
+        """Records what is new, and returns the simulated time, s; see `Recording.look`."""
+        return self.read(lambda recording: recording.look(self.status, rows))
 
     def close(self) -> None:
         with self._lock:

@@ -227,13 +227,12 @@ class Lab:
         on."""
         ready = self._ready()
         self._learner.look()
-        record = self._learner.record
-        rows = None if record is None else self._learner.read(lambda *_: record.whole())
-        if record is None or rows is None:
+        found = self._learner.read(lambda recording: (recording.layout, recording.whole()))
+        if found is None:
             raise InputError("the simulation was stopped: call show again")
         run = self._learner.choice.run
         how = {"scene": run.scene, "urdf": run.urdf, "tip": run.tip, "hold": list(run.hold), "seed": run.seed}
-        return named(ready.robot, self.settings, record.layout, rows, how)
+        return named(ready.robot, self.settings, *found, how)
 
     def stop(self) -> None:
         """Ends the robot and its page. A second call does nothing."""

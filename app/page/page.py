@@ -3,7 +3,6 @@ of the user's own is shown again when its file is saved."""
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import math
 import threading
@@ -18,7 +17,6 @@ import numpy as np
 import viser
 
 from app.adapter import private
-from app.client.progress import Notebook
 from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
 from app.html.palette import level_colours
@@ -26,10 +24,10 @@ from app.html.text import block, esc, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.link.threads import on_thread
-from app.page.comfort import Comfort
 from app.panels.widgets.command import add_command
+from app.tab.visitor import Visitor
 from lessons.course import COURSE, heading
-from lessons.own.files import Folder, Stamp, is_lesson, stamp
+from lessons.own.files import Stamp, is_lesson, stamp
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -119,29 +117,16 @@ class Page:
 
     def __init__(
         self,
-        client: viser.ClientHandle,
+        visitor: Visitor,
         learner: SimulationClient,
-        dark: bool,
-        own_files: Folder | None,
-        loop: asyncio.AbstractEventLoop,
-        notebook: Notebook,
-        comfort: Comfort,
-        on_dark: Callable[[bool], None],
         greet: Callable[[viser.GuiApi], None],
     ) -> None:
-        """own_files: the folder whose files this page may name; None if it may name no files; loop: viser's
-        event loop; on_dark: called with True for the dark theme and with False for the light theme; greet:
-        adds elements at the top of the panel whenever the panel is built."""
+        """greet: adds elements at the top of the panel whenever the panel is built."""
         self.learner = learner
-        self._on_dark = on_dark
         self._greet = greet
-        self._client = client
-        self._fault = FaultNotice(client)
+        self._visitor, self._client = visitor, visitor.client
+        self._fault = FaultNotice(visitor.client)
         self._lesson_file = LessonFile()
-        self._dark = dark
-        self._own_files = own_files
-        self._event_loop = loop
-        self._notebook, self._comfort = notebook, comfort
         self._phone = self._narrow = False
         self._seen: tuple[object, ...] | None = None  # the scene for which the camera was turned
         self._scene: SceneView | None = None
@@ -156,12 +141,12 @@ class Page:
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        camera = self._client.camera
-        wide, high = self._comfort.window or (camera.image_width, camera.image_height)
+        camera, comfort = self._client.camera, self._visitor.comfort
+        wide, high = comfort.window or (camera.image_width, camera.image_height)
         self._phone, self._narrow = wide < high, wide < max(high, NARROW)
         gui = self._client.gui
         lay_out(gui)
-        self._theme(self._dark)
+        comfort.set_theme(comfort.dark)
         self._waiting = gui.add_html(starting(self.learner.choice))
         self._thread = on_thread("page's loop", self._loop_on_thread)
 
@@ -171,13 +156,6 @@ class Page:
             self._thread.join(2.0)
         if self._scene is not None:
             self._scene.close()
-
-    def _theme(self, dark: bool) -> None:
-        self._dark = dark
-        self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
-        if self._scene is not None:
-            self._scene.paint_floor(dark)
-        self._on_dark(dark)
 
     # ---------------------------------------------------------------- loop
 
@@ -299,7 +277,8 @@ class Page:
     def _load(self, choice: SceneChoice) -> None:
         """Loads the scene that a panel requests. Refuses files that this page may not name."""
         asked = choice.asked - self.learner.choice.paths
-        if asked and (self._own_files is None or not all(map(self._own_files.holds, asked))):
+        own_files = self._visitor.own_files
+        if asked and (own_files is None or not all(map(own_files.holds, asked))):
             self._client.add_notification("Not loaded", _NOT_ITS_FILE, color="red")
             return
         self.learner.load(choice)
@@ -317,21 +296,11 @@ class Page:
             self._client.scene.reset()
             self._client.gui.reset()
             self._greet(self._client.gui)
-            context = PageContext(
-                self._client,
-                self.learner,
-                ready,
-                level_colours([task.level for task in in_order(ready)]),
-                self._event_loop,
-                self._dark,
-                self._load,
-                self._theme,
-                self._own_files,
-                self._notebook,
-            )
-            self._scene = SceneView(context, self._comfort, self._narrow)
+            colours = level_colours([task.level for task in in_order(ready)])
+            context = PageContext(self._visitor, self.learner, ready, colours, self._load)
+            self._scene = SceneView(context, self._narrow)
             add_command(self._client.gui, "Camera: show the whole robot", "F", self._frame)
-            self._comfort.opened(self.learner)
+            self._visitor.comfort.opened(self.learner)
             run = ready.choice.run
             seen = (run.scene, run.urdf, run.tip, run.hold, ready.choice.urdf_text, ready.robot.name)
             if seen != self._seen:  # after a restart the camera stays as the learner left it
@@ -353,7 +322,7 @@ class Page:
         direction."""
         from app.view.camera import look
 
-        poses, ready = self.learner.read(lambda block, _: block.poses()), self._built
+        poses, ready = self.learner.read(lambda recording: recording.block.poses()), self._built
         if poses is None or ready is None or not np.isfinite(poses).all():
             return
         base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot may be far from the origin

@@ -16,7 +16,6 @@ from app.client.simulation import Trouble
 from app.client.simulation_client import GhostClient
 from app.html.palette import recoloured
 from app.link.messages import Ready
-from app.page.comfort import Comfort
 from app.page.torque import TorqueView
 from app.page.velocity import VelocityView
 from app.panels.lesson.step import Course
@@ -63,10 +62,11 @@ class SceneView:
     """The view of one scene, built once per scene. The page's loop calls `follow`; callbacks only post
     events."""
 
-    def __init__(self, page: PageContext, comfort: Comfort, narrow: bool) -> None:
+    def __init__(self, page: PageContext, narrow: bool) -> None:
         """narrow: whether the page, for example on a phone, has no room for a second panel. The plots
         are then tabs of the right panel."""
-        self.page, self._client, self._learner, self._comfort = page, page.client, page.learner, comfort
+        self.page, self._client, self._learner = page, page.client, page.learner
+        self._comfort = page.visitor.comfort
         self._level = view_of(page)
         self.shown: tuple[object, ...] | None = None
         """Identifies the instant that was shown last; None before the first instant."""
@@ -126,7 +126,7 @@ class SceneView:
             self._comfort.add_switch(gui)
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS):  # hotkeys also for levels that may be added later
-            add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
+            add_command(gui, f"Level {place + 1} on or off", key, partial(self._level.toggle, place))
         with plots.add_tab("Errors"):
             self._level.add_plots()
         with plots.add_tab("Joints"):
@@ -158,23 +158,18 @@ class SceneView:
                 plots.set_width(_SIDE)
         self.covered = above, below
 
-    def _toggle(self, place: int) -> None:
-        event = self._level.toggle(place)
-        if event is not None:
-            self.page.post(event)
-
     def _build_scene(self, scene: viser.SceneApi) -> None:
         # Shadows triple the rendering time of a frame, which matters on a laptop or a phone.
         scene.configure_default_lights(cast_shadow=False)
         self._floor = _floor(scene, self.page.ready.room)
-        self.paint_floor(self.page.dark)
+        self._paint_floor()
         self._robot = RobotView(scene, self.page.robot)
         self._level.add_scene(self._robot)
 
-    def paint_floor(self, dark: bool) -> None:
+    def _paint_floor(self) -> None:
         """Sets the colours of the floor's grid lines, which are less conspicuous than the robot on every
         background."""
-        cell, section = (70, 105) if dark else (215, 175)
+        cell, section = (70, 105) if self._comfort.dark else (215, 175)
         self._floor.cell_color = (cell, cell, cell)
         self._floor.section_color = (section, section, section)
 
@@ -215,6 +210,7 @@ class SceneView:
     def _draw(self, moment: Moment, plots: bool) -> None:
         learner = self._learner
         with self._client.atomic():
+            self._paint_floor()
             self._robot.move(moment.poses[:-1])
             self._show_ghost(moment)
             if learner.failure is not None:
@@ -244,17 +240,17 @@ class SceneView:
 
     def _write(self, moment: Moment) -> None:
         learner, settings = self._learner, self.page.settings
-        found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
-        if found is None or learner.status is None:
+        bound_ticks = learner.read(lambda recording: recording.bound_ticks.copy())
+        if bound_ticks is None or learner.status is None:
             return
         shown = SessionSnapshot(
-            self.page.ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s
+            self.page.ready, settings, moment.status, moment.latest.copy(), bound_ticks * settings.T_s
         )
         now = replace(shown, status=learner.status)
         with self._client.atomic():
             self._playback.update(now)
-            self._comfort.follow(now)
-            if found[1] > 0:
+            self._comfort.follow(now.facts())
+            if np.isfinite(shown.number("t")):  # since the first row
                 self._compare.update(now)
                 self._level.write(shown)
                 self.page.loop.call_soon_threadsafe(unless_removed, self._move.update)

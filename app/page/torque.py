@@ -27,7 +27,6 @@ from app.view.robot import CoverView, JointTurns, LinkPicker, RobotView
 from app.view.surroundings import ContactView, WorldView
 from app.view.targets import Movable, Targets, draggable
 from app.view.trails import Trails
-from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
 
 
@@ -108,8 +107,9 @@ class TorqueView:
         self._world, self._contacts = WorldView(scene, ready.world), ContactView(scene)
         self._pull = Pull(scene, robot, ready.robot, page.post)
         curves = [(task.path, page.colours[task.level]) for task in ready.tasks if task.path is not None]
-        position = draggable(ready.tasks)[0]
-        self._trails = Trails(scene, curves, LEVELS[0] if position is None else page.colours[position.level])
+        target = draggable(ready.tasks)
+        colour = LEVELS[0] if target is None else page.colours[target.position.level]
+        self._trails = Trails(scene, curves, colour)
 
     def _targets_now(self) -> dict[str, np.ndarray]:
         """Returns the present raw targets, also while a past instant is shown."""
@@ -119,17 +119,17 @@ class TorqueView:
 
     def _add_targets(self) -> None:
         page, tasks = self._page, self._page.ready.tasks
-        position, orientation = draggable(tasks)
+        target = draggable(tasks)
         self._hands = []
-        if position is not None:
-            targets, alone = self._targets_now(), self._turns is None  # labels of joints are near the target
-            self._hands = [Hand(page, position, orientation, targets, self._start.clamp, invites=alone)]
+        if target is not None:
+            alone = self._turns is None  # labels of joints are near the target
+            self._hands = [Hand(page, target, self._targets_now(), self._start.clamp, invites=alone)]
         self._targets = Targets(page, tasks, page.post)
 
     # ---------------------------------------------------------------- events out
 
-    def toggle(self, place: int) -> Set | None:
-        return self._tasks.toggle(place)
+    def toggle(self, place: int) -> None:
+        self._tasks.toggle(place)
 
     def movables(self) -> list[Movable]:
         return [*(each for hand in self._hands for each in hand.movables()), *self._targets.movables()]

@@ -110,10 +110,9 @@ class VelocityView:
     def _settings(self) -> VelocitySettings:
         return self._page.settings
 
-    def toggle(self, place: int) -> Set | None:
-        """Returns the event that switches the level at an index (0-based) on or off; None if there is no such
-        level."""
-        return self._roles.toggle(place)
+    def toggle(self, place: int) -> None:
+        """Switches the level at an index (0-based) on or off, if there is such a level."""
+        self._roles.toggle(place)
 
     def _put(self, name: str, centre: tuple[float, float, float]) -> None:
         self._page.post(Set(f"obstacles.{name}", centre))

@@ -10,15 +10,15 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import viser
 
-from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.palette import RGB
 from app.link.choice import SceneChoice
 from app.link.messages import Command, MissionRow, Post, Ready, Status
+from app.tab.comfort import Facts
 from app.tab.in_view import InView
 from app.tab.mirror import Bindings
+from app.tab.visitor import Visitor
 from lessons.events import Event, MoveTarget
-from lessons.own.files import Folder
 from lessons.settings.settings import SceneSettings
 from robots import Robot
 
@@ -55,6 +55,21 @@ class SessionSnapshot(Generic[S_co]):
         """Returns the error norm ‖x̃‖ of a task, m or rad."""
         return float(np.linalg.norm(self.field(f"error/{task}")))
 
+    def facts(self) -> Facts:
+        """Returns what the page says in sentences."""
+        status, fields = self.status, self.ready.layout.fields
+        return Facts(
+            status.running,
+            status.resets,
+            tuple((level.name, level.enabled) for level in self.settings.levels),
+            {
+                task.name: (self.error(task.name), task.unit)
+                for task in self.ready.tasks
+                if f"error/{task.name}" in fields
+            },
+            frozenset((each.kind, each.joint) for each in status.binding),
+        )
+
 
 @dataclass(eq=False)
 class PageContext:
@@ -62,37 +77,35 @@ class PageContext:
     do.
 
     Attributes:
-        client: the browser.
+        visitor: the browser tab and the person at it.
         learner: the simulation and its recorded data.
         ready: the description of the scene. It is replaced when the run continues with another stack.
         colours: the colour of each level, by name. They are changed in place with the stack.
-        loop: viser's event loop.
-        dark: whether the page opened with the dark theme.
         choose: loads another scene or step.
-        theme: called with True for the dark theme and with False for the light theme.
-        own_files: the folder whose files this page may name; None if it may name no files.
-        notebook: the learner's progress.
         in_view: the charts that the browser shows.
         bindings: for controls of settings that exist in every stack.
         dragged: whether a target of this scene was dragged.
     """
 
-    client: viser.ClientHandle
+    visitor: Visitor
     learner: SimulationClient
     ready: Ready
     colours: dict[str, RGB]
-    loop: asyncio.AbstractEventLoop
-    dark: bool
     choose: Callable[[SceneChoice], None]
-    theme: Callable[[bool], None]
-    own_files: Folder | None
-    notebook: Notebook
     in_view: InView = field(init=False)
     bindings: Bindings[Any] = field(init=False)
     dragged: bool = False
 
     def __post_init__(self) -> None:
         self.in_view, self.bindings = InView(self.client), Bindings(self.post, self.loop)
+
+    @property
+    def client(self) -> viser.ClientHandle:
+        return self.visitor.client
+
+    @property
+    def loop(self) -> asyncio.AbstractEventLoop:
+        return self.visitor.loop
 
     @property
     def gui(self) -> viser.GuiApi:
@@ -129,7 +142,7 @@ class PageContext:
         """Poses of all joints and the tip, (J, 7); None if another scene was loaded meanwhile, since
         its robot may have another number of joints."""
         learner = self.learner
-        return learner.read(lambda block, _: block.poses() if learner.ready is self.ready else None)
+        return learner.read(lambda run: run.block.poses() if learner.ready is self.ready else None)
 
     def poses_or_still(self) -> np.ndarray:
         """Returns `poses`, or identity poses if no poses are known, for objects that are built now and

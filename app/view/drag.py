@@ -20,11 +20,10 @@ from app.adapter import private
 from app.html.palette import BAD, RGB, TARGET
 from app.html.text import quantity
 from app.link.exercise import Lecture
-from app.link.messages import TaskView
 from app.link.threads import on_thread
 from app.tab.context import PageContext
 from app.view.robot import ARROW, gizmo_size, target_radius
-from app.view.targets import OPACITY, Gap, Handle, Movable, full, of_task, raw, wxyz, xyzw
+from app.view.targets import OPACITY, Gap, Handle, HandTarget, Movable, full, of_task, raw, wxyz, xyzw
 from lessons.events import MoveTarget
 from lessons.teaching.lesson import Challenge
 from lessons.teaching.prediction import Choice
@@ -129,8 +128,6 @@ class ReachabilityWorker:
         return q
 
 
-Moved = Callable[[np.ndarray, np.ndarray | None], None]
-
 _FRAME = 0.09  # m
 _STILL = 1e-4  # m, and the same number of rad: about a tenth of a pixel
 _INVITATION = "target: pull an arrow"
@@ -165,17 +162,15 @@ class TargetGizmo:
     def __init__(
         self,
         page: PageContext,
-        position: TaskView,
-        orientation: TaskView | None,
-        start: np.ndarray,
-        rotation: np.ndarray,
-        moved: Moved,
+        target: HandTarget,
+        start: pin.SE3,
+        moved: Callable[[np.ndarray, np.ndarray | None], None],
         invites: bool,
     ) -> None:
-        """start (3,): initial position of the target, m; rotation (3, 3); moved: called with the raw position
-        and, if rings are shown, the raw rotation; invites: see `Hand`."""
+        """start: initial pose of the target; moved: called with the raw position (3,), m, and, if rings are
+        shown, the raw rotation (3, 3); invites: see `Hand`."""
         scene, size, radius = page.client.scene, gizmo_size(page.robot), target_radius(page.robot)
-        self.position, self.orientation = position, orientation
+        self._target, axes = target, target.position.axes
 
         def dragged() -> None:
             self._invites = False
@@ -185,9 +180,9 @@ class TargetGizmo:
         def ball(name: str, colour: RGB, opacity: float, visible: bool) -> viser.IcosphereHandle:
             return scene.add_icosphere(name, radius=radius, color=colour, opacity=opacity, visible=visible)
 
-        place = {"wxyz": wxyz(rotation), "visible": orientation is not None}
-        arrows = self._arrows = Handle(scene, "/target", position.axes, size, position=start)
-        rings = self._rings = Handle(scene, "/target/turn", position.axes, size, rings=True, **place)
+        turned = {"wxyz": wxyz(start.rotation), "visible": target.orientation is not None}
+        arrows = self._arrows = Handle(scene, "/target", axes, size, position=start.translation)
+        rings = self._rings = Handle(scene, "/target/turn", axes, size, rings=True, **turned)
         self._ball = ball("/target/ball", TARGET, OPACITY, True)
         self._ghost = ball("/target/ghost", BAD, 0.45, False)
         self._label = scene.add_label(
@@ -216,12 +211,12 @@ class TargetGizmo:
 
     def show_rings(self, on: bool) -> None:
         """Shows the rings if the user may rotate the target."""
-        self._rings.control.visible = on and self.orientation is not None
+        self._rings.control.visible = on and self._target.orientation is not None
 
     def movable(self) -> Movable:
         """Returns the target, which can be moved without a mouse."""
         turn = self._rings.turn_by if self.turns else None
-        return Movable(self.position.name, lambda: self.raw, self._arrows.move_to, turn)
+        return Movable(self._target.position.name, lambda: self.raw, self._arrows.move_to, turn)
 
     def put(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
         """Moves the gizmo to a position and rotation, for example after a reset."""
@@ -318,31 +313,28 @@ class Hand:
     def __init__(
         self,
         page: PageContext,
-        position: TaskView,
-        orientation: TaskView | None,
+        target: HandTarget,
         targets: dict[str, np.ndarray],
         clamp: viser.GuiCheckboxHandle,
         invites: bool = True,
     ) -> None:
-        """position, orientation: see `draggable`; targets: the session's raw targets by task; clamp: whether
-        the controller gets only reachable targets; invites: whether a label invites to drag the target until
-        it was dragged."""
+        """targets: the session's raw targets by task; clamp: whether the controller gets only reachable
+        targets; invites: whether a label invites to drag the target until it was dragged."""
         self.verdict: Reachability | None = None
         self._page, self._clamp, self._targets = page, clamp, targets
-        self._position, self._orientation = position, orientation
+        self._position, self._orientation = position, orientation = target
         self._moved_at = -math.inf
         self._closed = False  # a drag or the result of a check can arrive while the gizmo is replaced
         self._lock = threading.Lock()  # drags arrive on viser's loop, the check answers on its own thread
         self._moves = self._given = self._turned = self._forgotten = 0
-        start = of_task(position, targets)
-        turned = None if orientation is None else of_task(orientation, targets)
+        at = of_task(position, targets)
+        turned = np.eye(3) if orientation is None else of_task(orientation, targets)
         if orientation is not None and turned is None:
             turned = raw(orientation)
         hand = page.poses_or_still()[-1, :3]
-        self._place = full(position, position.raw if start is None else start, hand)
+        self._place = full(position, position.raw if at is None else at, hand)
         self._judge = ReachabilityWorker(page.robot, self._placed, self._judged)
-        rotation = np.eye(3) if turned is None else turned
-        self._gizmo = TargetGizmo(page, position, orientation, self._place, rotation, self._moved, invites)
+        self._gizmo = TargetGizmo(page, target, pin.SE3(turned, self._place), self._moved, invites)
 
     def _moved(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
         if self._closed:

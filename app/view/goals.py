@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import numpy as np
 import viser
 
-from app.html.palette import RGB
 from app.html.text import free_name, quantity
 from app.link.messages import MissionRow, Status, TaskView
 from app.tab.context import PageContext
@@ -29,22 +27,17 @@ class Goal:
     can be dragged, arrows along the world's axes."""
 
     def __init__(
-        self,
-        scene: viser.SceneApi,
-        role: str,
-        axes: str,
-        colour: RGB,
-        start: np.ndarray,
-        size: float,
-        moved: Callable[[np.ndarray], None] | None,
+        self, page: PageContext, task: TaskView, moved: Callable[[TaskView, np.ndarray], None]
     ) -> None:
-        """start (3,): initial position, m; size: of the arrows, m; moved: called with the goal (3,), m, after
-        each move; None if the goal cannot be dragged."""
-        floor = "z" not in axes
+        """task: of the role; a goal without a raw target cannot be dragged; moved: called with the task and
+        the goal (3,), m, after each move."""
+        scene, role, colour = page.client.scene, task.name, page.colours[task.level]
+        floor = "z" not in task.axes
+        size = gizmo_size(page.robot) * (2 if floor else 1)
         self._lift = np.array([0.0, 0.0, _LIFT if floor else 0.0])
         node = f"/goal/{role}"
-        position = start + self._lift
-        self.handle = None if moved is None else Handle(scene, node, axes, size, position=position)
+        position = (np.zeros(3) if task.raw is None else point(task.raw)) + self._lift
+        self.handle = None if task.raw is None else Handle(scene, node, task.axes, size, position=position)
         self._node: viser.SceneNodeHandle = (
             scene.add_frame(node, show_axes=False, position=position)
             if self.handle is None
@@ -58,8 +51,8 @@ class Goal:
             f"{node}/label", role, position=(0.0, 0.0, 0.9 * size + 0.06), anchor="bottom-center"
         )
         self._gap = Gap(scene, f"/gap/{role}", colour, 0.008, _GAP)
-        if moved is not None and self.handle is not None:
-            self.handle.listen(lambda: moved(self.place()))
+        if self.handle is not None:
+            self.handle.listen(lambda: moved(task, self.place()))
 
     def place(self) -> np.ndarray:
         """Returns the position of the goal, (3,) m."""
@@ -92,21 +85,10 @@ class Goals:
     predefined trajectory cannot be dragged and shows the present reference of its point."""
 
     def __init__(self, page: PageContext) -> None:
-        self._page, tasks, size = page, page.ready.tasks, gizmo_size(page.robot)
+        self._page, tasks = page, page.ready.tasks
         self._roles = {task.name: task for task in tasks if task.kind == "position"}
         self._given = frozenset(name for name, task in self._roles.items() if task.raw is None)
-        self._goals = {
-            name: Goal(
-                page.client.scene,
-                name,
-                task.axes,
-                page.colours[task.level],
-                np.zeros(3) if task.raw is None else point(task.raw),
-                size if "z" in task.axes else 2 * size,
-                None if task.raw is None else partial(self._moved, task),
-            )
-            for name, task in self._roles.items()
-        }
+        self._goals = {name: Goal(page, task, self._moved) for name, task in self._roles.items()}
         self._asked: dict[str, str] = {}
         turning = tuple(task for task in tasks if task.kind == "orientation")
         self._rings = Targets(page, turning, self._turned)

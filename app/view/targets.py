@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -26,16 +26,21 @@ def in_order(ready: Ready) -> list[TaskView]:
     return list({task.level: task for task in ready.tasks}.values())
 
 
-def draggable(tasks: tuple[TaskView, ...]) -> tuple[TaskView | None, TaskView | None]:
-    """Returns the first position target of the stack, and an orientation target of the same frame."""
-    position = next((t for t in tasks if t.kind == "position" and t.raw is not None), None)
+class HandTarget(NamedTuple):
+    """The first position target of a stack, and an orientation target of the same frame."""
+
+    position: TaskView
+    orientation: TaskView | None
+
+
+def draggable(tasks: tuple[TaskView, ...]) -> HandTarget | None:
+    """Returns the target that `app.view.drag.Hand` handles, if there is one."""
+    moved = [task for task in tasks if task.raw is not None]
+    position = next((task for task in moved if task.kind == "position"), None)
     if position is None:
-        return None, None
-    orientation = next(
-        (t for t in tasks if t.kind == "orientation" and t.raw is not None and t.frame == position.frame),
-        None,
-    )
-    return position, orientation
+        return None
+    turned = (task for task in moved if task.kind == "orientation" and task.frame == position.frame)
+    return HandTarget(position, next(turned, None))
 
 
 def raw(task: TaskView) -> np.ndarray:
@@ -168,7 +173,7 @@ class Targets:
     """One target for every task in Cartesian space that has no gizmo of `Hand`."""
 
     def __init__(self, page: PageContext, tasks: tuple[TaskView, ...], post: Send) -> None:
-        of_hand = {task.name for task in draggable(tasks) if task is not None}
+        of_hand = {task.name for task in draggable(tasks) or () if task is not None}
         self._targets = [
             _Target(page, task, post)
             for task in tasks

@@ -12,7 +12,7 @@ import secrets
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -27,16 +27,17 @@ from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.process import why_not
-from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, NAME_TAB, REDUCED, Comfort, window_size
 from app.page.page import Page
 from app.panels.run.classroom import ClassCard, add_watching
+from app.tab.comfort import ASK_MOTION, ASK_WINDOW, DARK, MOTION, NAME_TAB, REDUCED, Comfort, window_size
+from app.tab.visitor import Visitor
 from app.web.guard import GuardedConnection
 from app.web.inlet import Inlet
 from app.web.limits import UPLOADS, Uploads
 from app.web.sessions import GRACE, Classroom, Sessions, Watcher, tokens_of
 from lessons.course import COURSE
 from lessons.own.files import Folder
-from lessons.replay.progress import LearnerProgress, load_progress
+from lessons.replay.progress import load_progress
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -132,7 +133,6 @@ _OWN_TEXT = f"""(() => {{
   document.head.append(style);
 }})()"""
 _TOKENS = "himpc-lab-sessions"
-_DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
 _ELSEWHERE = 3.0  # s for which a full server's page waits before it connects again
 _PERIOD = 1.0  # s between two checks of the page's place
@@ -206,10 +206,7 @@ class Visit:
         self._left = False
         self._seat = ""
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
-        self._dark = False
         self._stored: str | None = None  # the place that the tab stored last
-        self._notebook = Notebook(LearnerProgress(), lambda _: None)
-        self._comfort = Comfort(client, reduced=False)
         self._workers = Workers()
         self._steps = ThreadPoolExecutor(1, thread_name_prefix="visit")
         private.give_workers(client, self._workers)
@@ -241,7 +238,7 @@ class Visit:
         size = f"{here}-window"
         private.run_script(self._client, place_asked(here))
         private.run_script(self._client, ASK_WINDOW % (STORED, size))
-        keys = (self._tokens_key, _DARK, self._progress_key, MOTION, here, size)
+        keys = (self._tokens_key, DARK, self._progress_key, MOTION, here, size)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
         if self._left:  # `leave` may have found nothing to cancel
             self._asking.cancel()
@@ -253,14 +250,18 @@ class Visit:
             self._client.local_storage.remove_item(key)
         short = [text if text and len(text) <= _LONGEST else None for text in found]
         tokens, dark, progress, motion, kept, window = short
-        self._dark = dark == "1"
         reduced = motion == REDUCED and isinstance(self._sessions, Sessions)
-        self._comfort = Comfort(self._client, reduced, window_size(window))
-        self._notebook = Notebook(
-            load_progress(progress, self._options.key, self._account),
-            lambda text: self._keep(self._progress_key, text),
-            self._options.key,
-            self._account,
+        self._visitor = Visitor(
+            self._client,
+            self._server.get_event_loop(),
+            self._own_files,
+            Notebook(
+                load_progress(progress, self._options.key, self._account),
+                lambda text: self._keep(self._progress_key, text),
+                self._options.key,
+                self._account,
+            ),
+            Comfort(self._client, reduced, window_size(window), dark == "1"),
         )
         self._then(tokens_of(tokens), kept)
         self._watch()
@@ -319,17 +320,9 @@ class Visit:
                 self._client.add_notification(*_GOES_ON, color="green", auto_close_seconds=8.0)
         others = [token for token in tokens if token != learner.token][-7:]
         self._keep(self._tokens_key, json.dumps([*others, learner.token] if learner.token else others))
-        self._page = Page(
-            self._client,
-            learner,
-            self._dark,
-            None if isinstance(learner, Watcher) else self._own_files,
-            self._server.get_event_loop(),
-            self._notebook,
-            self._comfort,
-            on_dark=self._remember_dark,
-            greet=partial(self._greet, learner, leads),
-        )
+        watches = isinstance(learner, Watcher)
+        visitor = replace(self._visitor, own_files=None) if watches else self._visitor
+        self._page = Page(visitor, learner, partial(self._greet, learner, leads))
         self._page.start()
 
     def _end(self) -> None:
@@ -360,10 +353,6 @@ class Visit:
 
     def _keep(self, key: str, text: str) -> None:
         self._client.local_storage.set_item(key, text)
-
-    def _remember_dark(self, on: bool) -> None:
-        self._dark = on
-        self._keep(_DARK, "1" if on else "0")
 
     def _greet(self, learner: SimulationClient, leads: bool, gui: viser.GuiApi) -> None:
         """Adds the field for the instructor's token to a page that can only watch. Adds the card of a class
@@ -403,8 +392,8 @@ class Visit:
         self._client.add_notification(title, sentence, color="orange")
 
     def _turn_away(self, tokens: Sequence[str], kept: str | None) -> None:
-        gui = self._client.gui
-        gui.configure_theme(dark_mode=self._dark, show_share_button=False, show_logo=False)
+        gui, comfort = self._client.gui, self._visitor.comfort
+        comfort.set_theme(comfort.dark)
         modal = gui.add_modal("All places are taken")
         with modal:
             gui.add_html(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.client.recording import BUCKETS, History
+from app.client.recording import BUCKETS, Recording
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.messages import Load, LoadRefused, Play, Post, Ready, ResetAll, Speed, StepTicks
@@ -141,7 +141,7 @@ def test_a_scene_that_cannot_be_loaded_at_all() -> None:
 
 def test_history_keeps_spikes_and_counts_bounds(body: SimulationRunner) -> None:
     layout = body.session.layout
-    history = History(body.block, layout)
+    recording = Recording(body.block, layout)
     row = np.zeros(layout.size)
     for k in range(95):
         row[:] = 0.0
@@ -154,16 +154,19 @@ def test_history_keeps_spikes_and_counts_bounds(body: SimulationRunner) -> None:
             row[layout.fields["v_limit"]] = 1.0
         body.block.write(row)
         if k % 7 == 0:
-            history.pull()
-    history.pull()
-    window = history.window()
+            recording.pull()
+    recording.pull()
+    window = recording.window()
     assert np.nanmax(window.columns(layout.fields["step_us"])) == 7.0
-    assert history.bound_ticks[2].tolist() == [1, 0, 1, 1, 0] and history.bound_ticks.sum() == 4
-    assert history.bound_ticks[3].tolist() == [0, 1, 0, 0, 0]
+    assert recording.bound_ticks[2].tolist() == [1, 0, 1, 1, 0] and recording.bound_ticks.sum() == 4
+    assert recording.bound_ticks[3].tolist() == [0, 1, 0, 0, 0]
     assert window.at_bound(0)[:, 2].sum() == 2  # one bucket is drawn as two points
     assert len(window.ages()) == 2 * BUCKETS
-    history.forget()
-    assert np.isnan(history.window().columns(layout.fields["t"])).all()
+    recording.take(np.zeros((1, layout.size)))
+    assert (
+        np.isfinite(recording.window().columns(layout.fields["t"])).sum() == 2
+        and not recording.bound_ticks.any()
+    )
 
 
 def test_the_ring_wraps(body: SimulationRunner) -> None:

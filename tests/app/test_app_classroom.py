@@ -57,7 +57,7 @@ def test_watchers_have_what_pages_use() -> None:
         for path in ([ROOT / folder] if folder.endswith(".py") else (ROOT / folder).rglob("*.py"))
         for found in re.findall(r"\blearner\.([a-z]\w*)", path.read_text())
     }
-    assert {"send", "settings_of", "tape"} <= used
+    assert {"send", "settings_of", "look"} <= used
     assert {name for name in used if not hasattr(Watcher, name)} <= {"import"}
     own = {
         name: found for name, found in vars(Watcher).items() if inspect.isfunction(found) and name[0] != "_"

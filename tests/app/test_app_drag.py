@@ -105,10 +105,10 @@ def hand_in(
 ) -> Hand:
     """Returns the dragged target of a scene."""
     targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
-    position, orientation = draggable(ready.tasks)
-    assert position is not None
+    target = draggable(ready.tasks)
+    assert target is not None
     switch: Any = SimpleNamespace(value=clamp)
-    return Hand(page_of(scene, ready, post, later), position, orientation, targets, switch)
+    return Hand(page_of(scene, ready, post, later), target, targets, switch)
 
 
 class Held:
@@ -272,7 +272,9 @@ class Hasty(Scene):
 def test_a_drag_that_arrives_while_its_handle_is_built_does_no_harm(ready: Ready) -> None:
     scene: Any = Hasty()
     moved = MagicMock()
-    Goal(scene, "hand", "xyz", JOINTS[0], np.zeros(3), 0.2, moved)
+    page = page_of(scene, ready, moved)
+    page.colours = {task.level: JOINTS[0] for task in ready.tasks}
+    Goal(page, next(task for task in ready.tasks if task.kind == "position"), moved)
     _Solid(scene, 0, Ball("ball", (0.0, 0.0, 0.0), 0.1), moved)
     arms = SimulationRunner(SceneChoice(RunSpec("baxter-hold"))).ready()
     Targets(page_of(scene, arms, moved), arms.tasks, moved)

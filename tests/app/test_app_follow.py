@@ -71,7 +71,7 @@ def test_the_page_of_a_mobile_robot_goes_along_once_it_is_asked() -> None:
         learner = server.sessions.learners[0]
 
         def base() -> np.ndarray:
-            found = learner.read(lambda _, history: history.latest[history.layout.fields["x/base"]])
+            found = learner.read(lambda recording: recording.latest[recording.layout.fields["x/base"]])
             return np.full(2, np.nan) if found is None else found.copy()
 
         assert eventually(lambda: bool(np.isfinite(base()).all()))

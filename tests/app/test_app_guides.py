@@ -56,13 +56,15 @@ def test_levels_are_named_where_they_are(scene: str, change: str) -> None:
     tasks, levels = opened(scene, change)
     colours = level_colours([level.name for level in levels])
     first = guide(tasks, levels, colours, dragged=False)
-    position = draggable(tasks)[0]
-    if position is None:
+    target = draggable(tasks)
+    if target is None:
         assert "curve" in first and not told(first)
         return
     if "position.enabled" not in change:
         assert told(first) == enabled(levels)
-        own = next(level for level in levels if any(task.name == position.name for task in level.tasks))
+        own = next(
+            level for level in levels if any(task.name == target.position.name for task in level.tasks)
+        )
         assert f"<b>{spoken(own.name)}</b>" in first and css(colours[own.name]) in first
     else:
         assert "switched off" in first

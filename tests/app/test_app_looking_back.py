@@ -6,13 +6,14 @@ import csv
 import io
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from app.client.recording import KEPT, MOST, WINDOW, Frame, History, PoseHistory, RowHistory, RunStatistics
+from app.client.recording import KEPT, MOST, RATE, Frame, Recording
 from app.link.choice import SceneChoice
 from app.link.ring import Block
 from app.view.pull import Grip, pulled, push_at
@@ -40,6 +41,13 @@ def layout(body: SimulationRunner) -> Layout:
     return body.session.layout
 
 
+@pytest.fixture
+def recording(layout: Layout) -> Iterator[Recording]:
+    block = Block(layout.size, 1)
+    yield Recording(block, layout)
+    block.close()
+
+
 def rows_at(layout: Layout, times: np.ndarray, field: str, values: np.ndarray) -> np.ndarray:
     rows = np.zeros((len(times), layout.size))
     rows[:, layout.fields["t"].start] = times
@@ -55,40 +63,37 @@ def frame(t: float, x: float = 0.0, turn: float = 0.0) -> Frame:
     return Frame(t, pose[None], None)
 
 
-def test_the_tape_shows_any_moment_of_the_last_minute() -> None:
-    tape = PoseHistory()
-    assert tape.at(1.0) is None and tape.span == (0.0, 0.0)
+def test_the_recording_shows_any_moment_of_the_last_minute(recording: Recording) -> None:
+    assert recording.frame(1.0) is None and recording.span == (0.0, 0.0)
     for k in range(30 * 90):
-        tape.add(frame(k / 30, x=k / 30, turn=0.02 * k))
-    first, last = tape.span
+        recording.add(frame(k / 30, x=k / 30, turn=0.02 * k))
+    first, last = recording.span
     assert last - first == pytest.approx(KEPT, abs=0.05)
-    found = tape.at(72.345)
+    found = recording.frame(72.345)
     assert found is not None and found.poses[0, 0] == pytest.approx(72.345)
     expected = frame(0.0, turn=0.02 * 30 * 72.345).poses[0, 3:]
     assert abs(found.poses[0, 3:] @ expected) == pytest.approx(1.0, abs=1e-6)
-    times = [each.t for each in tape.between(70.0, 71.0)]
+    times = [each.t for each in recording.frames(70.0, 71.0)]
     assert len(times) == pytest.approx(30, abs=1) and times == sorted(times)
 
 
-def test_slow_motion_needs_no_more_room_and_a_reset_empties_the_tape() -> None:
-    tape = PoseHistory()
+def test_slow_motion_needs_no_more_room_and_a_reset_empties_the_recording(recording: Recording) -> None:
     for k in range(3000):
-        tape.add(frame(1e-3 * k))
-    assert len(list(tape.between(-1.0, 10.0))) < 3.0 * 30 + 3
-    found = tape.at(2.999)
+        recording.add(frame(1e-3 * k))
+    assert len(recording.frames(-1.0, 10.0)) < 3.0 * 30 + 3
+    found = recording.frame(2.999)
     assert found is not None and found.t == 2.999  # the newest moment is always stored
-    tape.add(frame(0.0))
-    assert tape.span == (0.0, 0.0)
+    recording.add(frame(0.0))
+    assert recording.span == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("rate", [30.0, 10.0])
-def test_the_tape_holds_no_more_than_a_minute(rate: float) -> None:
+def test_the_recording_holds_no_more_than_a_minute(recording: Recording, rate: float) -> None:
     """The history has at most a minute of frames, also if a busy machine shows fewer frames per second."""
-    tape = PoseHistory()
     lengths: list[int] = []
     for k in range(round(150 * rate)):
-        tape.add(frame(k / rate))
-        lengths.append(len(list(tape.between(-1.0, 1e3))))
+        recording.add(frame(k / rate))
+        lengths.append(len(recording.frames(-1.0, 1e3)))
     filled = lengths[round(61 * rate) :]
     assert max(filled) - min(filled) <= 1
     assert max(filled) <= KEPT * rate + 1
@@ -97,27 +102,45 @@ def test_the_tape_holds_no_more_than_a_minute(rate: float) -> None:
 # ---------------------------------------------------------------- curves
 
 
-def test_plots_of_the_past_are_those_that_were_seen(layout: Layout) -> None:
-    block = Block(layout.size, 1)
-    try:
-        history, seen = History(block, layout), {}
-        for k in range(40):
-            times = 0.5 * k + 0.002 * np.arange(250)
-            for row in rows_at(layout, times, "step_us", np.sin(7 * times)):
-                block.write(row)
-            history.pull()
-            seen[round(float(times[-1]), 3)] = history.window().columns(layout.fields["step_us"])
-        for t in (19.998, 12.498, 9.998):
-            assert np.array_equal(
-                history.window(t).columns(layout.fields["step_us"]), seen[t], equal_nan=True
-            )
-            assert history.at(t)[layout.fields["t"]] == pytest.approx(t, abs=WINDOW / 160)
-        block.write(rows_at(layout, np.zeros(1), "step_us", np.ones(1))[0])
-        history.pull()
-        assert np.nanmax(history.window().columns(layout.fields["step_us"])) == 1.0  # a new run
-        assert np.isfinite(history.window().columns(layout.fields["t"])).sum() == 2
-    finally:
-        block.close()
+def test_plots_of_the_past_are_those_that_were_seen(recording: Recording, layout: Layout) -> None:
+    block, seen = recording.block, {}
+    for k in range(40):
+        times = 0.5 * k + 0.002 * np.arange(250)
+        for row in rows_at(layout, times, "step_us", np.sin(7 * times)):
+            block.write(row)
+        recording.pull()
+        seen[round(float(times[-1]), 3)] = recording.window().columns(layout.fields["step_us"])
+    for t in (19.998, 12.498, 9.998):
+        assert np.array_equal(recording.window(t).columns(layout.fields["step_us"]), seen[t], equal_nan=True)
+        assert 0.0 <= t - recording.row(t)[layout.fields["t"]][0] < 1 / RATE
+    block.write(rows_at(layout, np.zeros(1), "step_us", np.ones(1))[0])
+    recording.pull()
+    assert np.nanmax(recording.window().columns(layout.fields["step_us"])) == 1.0  # a new run
+    assert np.isfinite(recording.window().columns(layout.fields["t"])).sum() == 2
+
+
+def test_a_run_continues_with_another_stack(recording: Recording, layout: Layout) -> None:
+    """The recording is moved to the new layout: the same poses, rows and curves, without the columns that
+    only the old stack has."""
+    fewer = replace(layout, fields={k: v for k, v in layout.fields.items() if k != "q_measured"})
+    for k in range(70 * 30):
+        times = (k + np.arange(1, 5) / 4) / 30
+        recording.take(rows_at(layout, times, "unsolved", np.sin(7 * times)))
+        recording.add(frame(times[-1], x=times[-1]))
+    other = Block(layout.size, 1)
+    moved = recording.under(other, fewer)
+    for field in ("t", "unsolved"):
+        columns = layout.fields[field]
+        for which in (Recording.minute, Recording.whole):
+            assert np.array_equal(which(moved)[:, columns], which(recording)[:, columns])
+        assert np.array_equal(moved.row(33.3)[columns], recording.row(33.3)[columns])
+        curves = recording.window(50.0).columns(columns)
+        assert np.isfinite(curves).all() and np.array_equal(moved.window(50.0).columns(columns), curves)
+    assert moved.span == recording.span and moved.statistics.result() is None
+    for each in (moved, recording):
+        each.take(rows_at(layout, np.array([70.1]), "unsolved", np.ones(1)))
+    assert np.array_equal(moved.whole()[:, 0], recording.whole()[:, 0])
+    other.close()
 
 
 def test_two_clocks_of_one_time_have_the_same_buckets(layout: Layout) -> None:
@@ -126,35 +149,29 @@ def test_two_clocks_of_one_time_have_the_same_buckets(layout: Layout) -> None:
     found = []
     for period, late in ((0.001, 0), (0.004, 3)):
         block = Block(layout.size, 1)
-        history = History(block, layout)
+        recording = Recording(block, layout)
         times = np.arange(0.0, 2.0, period)[: len(np.arange(0.0, 2.0, period)) - late]
         for row in rows_at(layout, times, "step_us", np.floor(times / 0.05 + 1e-6)):
             block.write(row)
-        history.pull()
-        found.append(history.window(1.9999).columns(layout.fields["step_us"]))
+        recording.pull()
+        found.append(recording.window(1.9999).columns(layout.fields["step_us"]))
         block.close()
     assert np.array_equal(found[0], found[1], equal_nan=True)
 
 
-def test_a_period_longer_than_a_bucket_leaves_no_gaps(layout: Layout) -> None:
-    block = Block(layout.size, 1)
-    history = History(block, layout)
-    for row in rows_at(layout, 0.12 * np.arange(20), "step_us", 1.0 + np.arange(20.0)):
-        block.write(row)
-    history.pull()
-    seen = history.window().columns(layout.fields["step_us"])[:, 0]
+def test_a_period_longer_than_a_bucket_leaves_no_gaps(recording: Recording, layout: Layout) -> None:
+    recording.take(rows_at(layout, 0.12 * np.arange(20), "step_us", 1.0 + np.arange(20.0)))
+    seen = recording.window().columns(layout.fields["step_us"])[:, 0]
     known = seen[np.isfinite(seen)]
     assert len(known) == 2 * (1 + round(19 * 0.12 / 0.05 - 0.1)) and (np.diff(known) >= 0).all()
     assert set(known) == set(1.0 + np.arange(20.0))
-    block.close()
 
 
 # ---------------------------------------------------------------- figures and files
 
 
-def test_the_score_counts_every_tick_of_the_run(layout: Layout) -> None:
-    score = RunStatistics(layout)
-    assert score.result() is None
+def test_the_figures_count_every_tick_of_the_run(recording: Recording, layout: Layout) -> None:
+    assert recording.statistics.result() is None
     name = layout.tasks[0].name
     for start in (0, 100):
         rows = rows_at(layout, 1e-3 * (start + np.arange(100)), "unsolved", np.ones(100))
@@ -162,39 +179,38 @@ def test_the_score_counts_every_tick_of_the_run(layout: Layout) -> None:
         rows[:, layout.fields["tau_upper"]], rows[:, layout.fields["tau_lower"]] = 2.0, -4.0
         rows[:, layout.fields["tau_demand"].start] = -3.0
         rows[:, layout.fields["step_us"]] = 500.0
-        score.append_rows(rows)
-    found = score.result()
+        recording.take(rows)
+    found = recording.statistics.result()
     assert found is not None and found.rmse[name] == pytest.approx(np.sqrt(5.0))
     assert found.torque_share == 0.75 and found.unsolved == 200 and found.seconds == pytest.approx(0.199)
     assert found.step_ms == pytest.approx(0.5, rel=0.03) and found.slow_ms == pytest.approx(0.5, rel=0.03)
-    score.append_rows(rows_at(layout, np.zeros(1), "unsolved", np.zeros(1)))
-    found = score.result()
+    recording.take(rows_at(layout, np.zeros(1), "unsolved", np.zeros(1)))
+    found = recording.statistics.result()
     assert found is not None and found.unsolved == 0 and found.rmse[name] == 0.0
 
 
-def test_a_record_of_any_length_stays_small_and_exact(layout: Layout) -> None:
-    record = RowHistory(layout)
+def test_a_recording_of_any_length_stays_small_and_exact(recording: Recording, layout: Layout) -> None:
     for minute in range(8):
         times = 60.0 * minute + 0.002 * np.arange(30_000)
-        record.take(rows_at(layout, times, "step_us", times**2))
-    recent, whole = record.recent(), record.whole()
+        recording.take(rows_at(layout, times, "step_us", times**2))
+    minute, whole = recording.minute(), recording.whole()
     t, value = layout.fields["t"].start, layout.fields["step_us"].start
-    assert len(recent) == 6000 and recent[0, t] == pytest.approx(420.0)
+    assert len(minute) == 6000 and minute[0, t] == pytest.approx(420.0)
     assert MOST // 3 < len(whole) < MOST and whole[0, t] == 0.0 and whole[-1, t] > 479.5
     assert np.unique(np.round(np.diff(whole[:, t]), 6)).size == 1  # evenly spaced
-    for rows in (recent, whole):
+    for rows in (minute, whole):
         assert np.array_equal(rows[:, value], rows[:, t] ** 2)
-    record.take(rows_at(layout, np.zeros(1), "step_us", np.ones(1)))
-    assert len(record.whole()) == len(record.recent()) == 1
+    recording.take(rows_at(layout, np.zeros(1), "step_us", np.ones(1)))
+    assert len(recording.whole()) == len(recording.minute()) == 1
 
 
 @pytest.fixture(scope="module")
 def run(body: SimulationRunner) -> Recorded:
-    history = History(body.block, body.session.layout)
+    recording = Recording(body.block, body.session.layout)
     for _ in range(6):
         body.tick(50)
-        history.pull()
-    return Recorded(history.layout, history.rows.whole())
+        recording.pull()
+    return Recorded(recording.layout, recording.whole())
 
 
 def test_files_hold_what_was_recorded(body: SimulationRunner, run: Recorded) -> None:

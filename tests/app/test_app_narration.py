@@ -11,7 +11,7 @@ import pytest
 from served import served
 from viser import _messages
 
-from app.page.comfort import AT_MOST_EVERY, MOTION, REDUCED, Facts, Narration
+from app.tab.comfort import AT_MOST_EVERY, MOTION, REDUCED, Facts, Narration
 from browsing.wire import Wire, eventually
 
 STILL = Facts(True, 0, (("position", True), ("posture", True)), {"position": (0.0, "m")}, frozenset())

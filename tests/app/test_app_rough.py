@@ -242,4 +242,4 @@ def test_files_arrive_with_their_message(start: Start) -> None:
     learner.send(Play(False))
     assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
     assert len(os.listdir("/proc/self/fd")) <= open_before
-    assert isinstance(learner.read(lambda block, _: block), Block)
+    assert isinstance(learner.read(lambda recording: recording.block), Block)

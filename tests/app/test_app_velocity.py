@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from served import served
 
-from app.client.recording import History
+from app.client.recording import Recording
 from app.html.text import free_name
 from app.link.choice import SceneChoice
 from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, StepTicks
@@ -215,7 +215,7 @@ def test_rings_on_the_page_turn_the_hand_of_an_arm() -> None:
         wanted = tuple(quaternion(exp3(np.array([0.0, 0.0, 0.5])) @ before))
 
         def turned() -> bool:
-            row = learner.read(lambda _, history: history.latest[history.layout.fields["x/orientation"]])
+            row = learner.read(lambda recording: recording.latest[recording.layout.fields["x/orientation"]])
             return row is not None and bool(np.abs(log3(from_quaternion(row) @ before.T))[2] > 0.45)
 
         # The message is repeated, because the first one may arrive before the control has a callback.
@@ -240,15 +240,15 @@ def test_a_row_counts_until_the_next_one_comes(body: SimulationRunner) -> None:
     curve has no gaps, and looking back finds a row at every time."""
     body.tick(30)
     layout = body.session.layout
-    history = History(body.block, layout)
-    history.pull()
+    recording = Recording(body.block, layout)
+    recording.pull()
     t = layout.fields["t"]
-    times = history.window(3.0).columns(t)[:, 0]
+    times = recording.window(3.0).columns(t)[:, 0]
     known = times[np.isfinite(times)]
     assert len(known) == 2 * round(3.0 / 0.05 + 1)
     assert np.array_equal(np.unique(known), history_times(body)) and (np.diff(known) >= 0).all()
-    assert history.at(1.37)[t][0] == pytest.approx(1.3)
-    assert np.isnan(history.window(8.0).columns(t)[-1]).all()
+    assert recording.row(1.37)[t][0] == pytest.approx(1.3)
+    assert np.isnan(recording.window(8.0).columns(t)[-1]).all()
 
 
 def test_a_chart_whose_first_curve_has_no_values_draws_the_others(body: SimulationRunner) -> None:
@@ -265,10 +265,10 @@ def test_a_chart_whose_first_curve_has_no_values_draws_the_others(body: Simulati
 
     def draw(after: int) -> None:
         body.tick(after)
-        history = History(body.block, layout)
-        history.pull()
+        recording = Recording(body.block, layout)
+        recording.pull()
         for _ in range(12):
-            plots.draw(history.window(), None)
+            plots.draw(recording.window(), None)
 
     body.handle(Post(RemoveTask("ee")))
     draw(0)

@@ -18,7 +18,7 @@ from served import served
 from viser import _messages
 from viser.infra._messages import wire_field_names
 
-from app.client.recording import History
+from app.client.recording import Recording
 from app.link.choice import SceneChoice
 from app.tab.context import PageContext
 from app.tab.mirror import Bindings
@@ -261,12 +261,12 @@ def test_poses_of_another_scene_are_none_of_this_page(monkeypatch: pytest.Monkey
     """The next scene, whose robot has other joints, arrives while the page is still the one of the scene
     before. This page gets no poses of the new robot."""
     robot, now = load_robot("iiwa14"), object()
-    block = SimpleNamespace(poses=lambda: np.ones((4, 7)))
-    learner = SimpleNamespace(ready=now, read=lambda look: look(block, None))
+    recording = SimpleNamespace(block=SimpleNamespace(poses=lambda: np.ones((4, 7))))
+    learner = SimpleNamespace(ready=now, read=lambda look: look(recording))
     ready = SimpleNamespace(robot=robot)
     mock = MagicMock()
     monkeypatch.setattr("app.tab.context.InView", mock)  # it sends a script to the browser
-    made: Any = (mock, learner, ready, {}, mock, False, mock, mock, None, mock)
+    made: Any = (mock, learner, ready, {}, mock)
     page = PageContext(*made)
     assert page.poses() is None
     assert page.poses_or_still().shape == (robot.n + 1, 7)
@@ -303,8 +303,8 @@ def test_a_control_that_goes_before_it_is_written_is_no_news() -> None:
 def test_the_newest_row_does_not_keep_all_that_came_with_it() -> None:
     """As a view, the row would keep all rows in memory until the next call, up to 12 MB per robot."""
     body = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
-    history = History(body.block, body.session.layout)
+    recording = Recording(body.block, body.session.layout)
     body.tick(50)
-    history.pull()
+    recording.pull()
     body.close()
-    assert history.latest.base is None and np.isfinite(history.latest[0])
+    assert recording.latest.base is None and np.isfinite(recording.latest[0])

@@ -58,7 +58,7 @@ PATHS: dict[str, tuple[str, ...]] = {
 def add_cards(page: PageContext, choose: Choose) -> None:
     """Adds the paths and the cards to the current container; every button can be reached by the keyboard.
     choose: opens a step or a scene."""
-    gui, progress = page.gui, page.notebook.progress
+    gui, progress = page.gui, page.visitor.notebook.progress
     gui.add_html(block("<b>How much time do you have?</b> Your progress is stored in this browser."))
     for words, names in PATHS.items():
         name, place = _unfinished(names, progress)
@@ -99,7 +99,7 @@ def _unfinished(names: Sequence[str], progress: LearnerProgress) -> tuple[str, i
 
 def add_invitation(page: PageContext) -> None:
     """Adds a button that leads to the next lesson or step, depending on the learner's progress."""
-    progress = page.notebook.progress
+    progress = page.visitor.notebook.progress
     name, place = _unfinished(COURSE, progress)
     lesson, number = load_lesson(name), COURSE.index(name) + 1
     word, _ = _offer(lesson, progress)

@@ -205,7 +205,7 @@ class LessonPanel:
     def _note(self, lecture: Lecture) -> None:
         if lecture.phase != "done":
             return
-        name, notebook = self._exercise.lesson, self._page.notebook
+        name, notebook = self._exercise.lesson, self._page.visitor.notebook
         progress = notebook.progress
         if isinstance(self._part, Step):
             progress = progress.with_step(name, self._exercise.place)
@@ -233,7 +233,7 @@ class LessonPanel:
             handle.visible = shown
         busy = lecture.phase in ("preparing", "running")
         self._run.disabled = busy or not ready
-        best = self._page.notebook.progress.best.get(self._exercise.lesson)
+        best = self._page.visitor.notebook.progress.best.get(self._exercise.lesson)
         self._idea.content = idea(self._part, opened=not seen)
         self._state.content = state(self._part, lecture, best)
         if self._far is not None or lecture.curves:

@@ -63,12 +63,12 @@ class ExportPanel:
             client.send_file_download(*made, save_immediately=True)
 
     def _rows(self, simulation: Simulation) -> Recorded | None:
-        record = simulation.record
-        if record is None:
-            return None
-        # The page's loop may append rows at the same time.
-        rows = simulation.read(lambda *_: record.recent() if self._span.value == _MINUTE else record.whole())
-        return None if rows is None or len(rows) < 2 else Recorded(record.layout, rows)
+        minute = self._span.value == _MINUTE
+        # Within `read`, the page's loop cannot add rows.
+        run = simulation.read(
+            lambda recording: Recorded(recording.layout, recording.minute() if minute else recording.whole())
+        )
+        return None if run is None or len(run.rows) < 2 else run
 
     def _name(self, ending: str) -> str:
         return f"{self._learner.choice.run.scene}-{self._page.settings.controller}.{ending}"
@@ -116,7 +116,7 @@ _DOWNLOAD = block(
 def add_hand_in(page: PageContext) -> None:
     """Adds the folder with which learners hand in their progress. The text to hand in is written when the
     learner asks for it, on one of viser's threads."""
-    gui, learner, notebook = page.gui, page.learner, page.notebook
+    gui, learner, notebook = page.gui, page.learner, page.visitor.notebook
     with gui.add_folder("Hand in your progress", expand_by_default=False):
         told = f" The text names your account, <b>{escape(notebook.account)}</b>." if notebook.account else ""
         gui.add_html(block((_SIGNED if notebook.signs else _NOT_SIGNED) + told))

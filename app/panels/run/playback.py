@@ -198,7 +198,8 @@ class TimeLine:
 
     def update(self, running: bool) -> None:
         """Shows or hides the slider; called for every frame, before the page reads `past`."""
-        first, last = self._learner.tape.span
+        recording = self._learner.recording
+        first, last = (0.0, 0.0) if recording is None else recording.span
         if running or last - first < _LEAST:
             if self._paused_at is not None:
                 self._leave()

@@ -31,7 +31,7 @@ class RobotPanel:
     scene or with the reason of a refusal."""
 
     def __init__(self, page: PageContext) -> None:
-        gui, ready, scenes, own_files = page.gui, page.ready, ALL_SCENES, page.own_files
+        gui, ready, scenes, own_files = page.gui, page.ready, ALL_SCENES, page.visitor.own_files
         robot = ready.robot
         self._choose = page.choose
         gui.add_html(

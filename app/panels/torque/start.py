@@ -45,10 +45,10 @@ def guide(
         dragged: whether the target has been dragged, so that the next suggestion is shown.
     """
     places = {level.name: place for place, level in enumerate(levels, start=1) if level.enabled}
-    position = draggable(tasks)[0]
-    if position is None:
+    target = draggable(tasks)
+    if target is None:
         return _paragraph(*_following(tasks, places))
-    return _paragraph(*(_next(places) if dragged else _first(position, places, colours)))
+    return _paragraph(*(_next(places) if dragged else _first(target.position, places, colours)))
 
 
 def _first(position: TaskView, places: Mapping[str, int], colours: Mapping[str, RGB]) -> tuple[str, str]:
@@ -121,9 +121,9 @@ class StartPanel:
         """recall: brings the target to the hand."""
         gui, ready, self._page = page.gui, page.ready, page
         self._guide = gui.add_html(guide(ready.tasks, page.settings.levels, page.colours, dragged=False))
-        draggable = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
-        self._where = gui.add_html("", visible=draggable)
-        with gui.add_folder("Target", visible=draggable):
+        drags = draggable(ready.tasks) is not None
+        self._where = gui.add_html("", visible=drags)
+        with gui.add_folder("Target", visible=drags):
             self.clamp = gui.add_checkbox(
                 "Keep within reach",
                 True,

@@ -3,9 +3,8 @@ change name, frame and axes while the robot moves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import fields
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from app.html.palette import BAD, DAMPING, RGB, button
 from app.html.text import block, esc, formula, joint_labels, joints_named, swatch
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.level_row import DOWN, MORE, UP, LevelRow, error_in_words
+from app.panels.widgets.level_row import LevelRow, error_in_words
 from app.tab.context import PageContext, SessionSnapshot
 from app.tab.mirror import Bindings, PendingEdit
 from himpc.stack import Level, Stack
@@ -272,10 +271,9 @@ class TasksPanel:
         gui = page.gui
         self._page, self._targets = page, targets
         self._edited, self._strip = "", strip
-        self._open: set[str] = set()
         gui.add_html(block("Each level gets the freedom that the levels above leave."), order=-1.0)
         self._place = gui.add_folder(None, order=0.0)
-        self._build(page.settings)
+        self._build(opened=())
         with gui.add_folder("Last level: damping", order=900.0):
             damping = gui.add_checkbox(
                 "Damp what no level controls",
@@ -295,9 +293,9 @@ class TasksPanel:
                 )
             )
 
-    def _build(self, settings: TorqueSettings) -> None:
+    def _build(self, opened: Collection[str]) -> None:
+        """opened: the names of the levels whose settings are open."""
         self._order: PendingEdit[tuple[str, ...]] = PendingEdit()
-        self._enabled: dict[str, PendingEdit[bool]] = {level.name: PendingEdit() for level in settings.levels}
         self._bindings: Bindings[TorqueSettings] = Bindings(self._ask, self._page.loop)
         self._moves: Bindings[Targets] = Bindings(self._page.post, self._page.loop)
         with self._place:
@@ -308,27 +306,20 @@ class TasksPanel:
                 self._rows_over_scene = self._page.gui.add_folder(None)
         with self._levels:
             self._rows = {
-                level.name: self._add_level(level, place) for place, level in enumerate(settings.levels)
+                level.name: self._add_level(level, place, level.name in opened)
+                for place, level in enumerate(self._page.settings.levels)
             }
             if not self._page.in_lesson:
                 self._add = AddTask(self._page)
 
-    def _add_level(self, level: Level, place: int) -> LevelRow:
-        """Adds the row of a level, with its settings and the controls that edit its tasks. These are unfolded
-        if one of the tasks was just edited."""
+    def _add_level(self, level: Level, place: int, opened: bool) -> LevelRow:
+        """Adds the row of a level, with its settings, which may be open, and the controls that edit its
+        tasks. These are unfolded if one of the tasks was just edited."""
         page, name, settings = self._page, level.name, self._page.settings
         unfolded = any(task.name == self._edited for task in level.tasks)
         hint = f"On or off: key {place + 1}. ▲ ▼: priority"
-        row = LevelRow(
-            page,
-            level,
-            place,
-            (UP, DOWN),
-            (hint, f"{hint}. ⋯: gains, weights and tasks of this level"),
-            partial(self._press, name),
-            self._rows_over_scene,
-            opened=name in self._open or unfolded,
-        )
+        hints = hint, f"{hint}. ⋯: gains, weights and tasks of this level"
+        row = LevelRow(page, level, place, hints, self._rows_over_scene, opened or unfolded, self._move)
         with row.details:
             controls = Controls(page.gui, self._bindings, settings)
             controls.add(f"levels.{name}.Q", f"levels.{name}.R")
@@ -361,11 +352,12 @@ class TasksPanel:
 
     def rebuild(self) -> None:
         """Shows the new stack."""
+        opened = {name for name, row in self._rows.items() if row.details.visible}
         self.close()
         self._levels.remove()
         if self._rows_over_scene is not None:
             self._rows_over_scene.remove()
-        self._build(self._page.settings)
+        self._build(opened)
 
     @property
     def picking(self) -> bool:
@@ -376,35 +368,19 @@ class TasksPanel:
         """Chooses the frame for the new task. Called when a link was clicked; `frame` is its frame."""
         self._add.choose(frame)
 
-    def toggle(self, place: int) -> Set | None:
-        """Returns the event for the hotkey of an index (0-based); None if there is no such level."""
-        levels = {level.name: level for level in self._page.settings.levels}
-        names = self._order.now(tuple(levels))
-        if place >= len(names) or names[place] not in levels:
-            return None
-        return self._switch(names[place])
+    def _names(self) -> tuple[str, ...]:
+        """The names of the levels in the order that the learner asked for last."""
+        return self._order.now(tuple(level.name for level in self._page.settings.levels))
 
-    def _switch(self, name: str) -> Set | None:
-        levels = {level.name: level for level in self._page.settings.levels}
-        if name not in levels:
-            return None
-        wish = self._enabled.setdefault(name, PendingEdit())
-        return Set(f"levels.{name}.enabled", wish.ask(not wish.now(levels[name].enabled)))
-
-    def _press(self, name: str, button: str) -> None:
-        """Called when a button of the row of a level was pressed."""
-        if button == MORE:
-            self._open ^= {name}
-        elif button in (UP, DOWN):
-            self._move(name, -1 if button == UP else 1)
-        else:
-            event = self._switch(name)
-            if event is not None:
-                self._page.post(event)
+    def toggle(self, place: int) -> None:
+        """Switches the level at an index (0-based) on or off, if there is such a level."""
+        for name in self._names()[place : place + 1]:
+            if name in self._rows:
+                self._rows[name].toggle()
 
     def _move(self, name: str, by: int) -> None:
         """Moves a level one place up (−1) or down (+1), if possible."""
-        names = list(self._order.now(tuple(level.name for level in self._page.settings.levels)))
+        names = list(self._names())
         to = names.index(name) + by if name in names else -1
         if 0 <= to < len(names):
             names.remove(name)

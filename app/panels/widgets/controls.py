@@ -231,9 +231,9 @@ class Controls(Generic[S]):
 
 def add_dark_switch(page: PageContext) -> None:
     """Adds the checkbox of the page's theme."""
-    dark = page.gui.add_checkbox("Dark theme", page.dark)
-
-    on_change(dark, lambda: page.theme(bool(dark.value)))
+    comfort = page.visitor.comfort
+    dark = page.gui.add_checkbox("Dark theme", comfort.dark)
+    on_change(dark, lambda: comfort.set_theme(bool(dark.value)))
 
 
 def add_control(

@@ -14,9 +14,11 @@ from app.html.palette import BAD, BOUND, css
 from app.html.text import badge, bar, esc, quantity
 from app.panels.widgets.command import on_click
 from app.tab.context import PageContext
+from app.tab.mirror import PendingEdit
 from himpc.stack import Level
+from lessons.events import Set
 
-ON, OFF, UP, DOWN, MORE = "on", "off", "▲", "▼", "⋯"
+_ON, _OFF, _UP, _DOWN, _MORE = "on", "off", "▲", "▼", "⋯"
 _LEAST = 1e-5
 """The error, m or rad, at which the bar begins; it is full at 1 m or 1 rad. Its scale is logarithmic."""
 _EACH = 2.2  # em: width of a button
@@ -41,35 +43,44 @@ class _Drawn(NamedTuple):
 
 
 class LevelRow:
-    """The row of one level. `details` is the folder of its settings. Over the scene the row is drawn once
-    more, without settings."""
+    """The row of one level, with the button that switches it on or off. `details` is the folder of its
+    settings. Over the scene the row is drawn once more, without settings."""
 
     def __init__(
         self,
         page: PageContext,
         level: Level,
         place: int,
-        others: tuple[str, ...],
         hints: tuple[str, str],
-        press: Callable[[str], None],
         strip: viser.GuiTabHandle | viser.GuiFolderHandle | None,
         opened: bool = False,
+        move: Callable[[str, int], None] | None = None,
     ) -> None:
-        """place: the index of the level, 0 being the highest priority; others: the buttons beside that for on
-        and off; hints: of the buttons, over the scene and in the tab; press: called with the button that was
-        pressed; strip: the place over the scene; opened: whether the settings are open."""
-        self._gui, self.name, self._others = page.gui, level.name, others
+        """place: the index of the level, 0 being the highest priority; hints: of the buttons, over the scene
+        and in the tab; strip: the place over the scene; opened: whether the settings are open; move: called
+        with the level's name and −1 or +1 when the level should go up or down; None: it has no buttons for
+        this."""
+        self._page, self._gui, self.name, self._move = page, page.gui, level.name, move
+        self._enabled: PendingEdit[bool] = PendingEdit()
+        self._others = () if move is None else (_UP, _DOWN)
         self._colour = page.colours.get(level.name, BOUND)
-        first = (ON if level.enabled else OFF, *others)
-        self._drawn = [self._draw(f"Level {self.name}", (*first, MORE), hints[1], press)]
+        first = (_ON if level.enabled else _OFF, *self._others)
+        self._drawn = [self._draw(f"Level {self.name}", (*first, _MORE), hints[1])]
         with self._drawn[0].folder:
             self.details = page.gui.add_folder(f"Settings of {self.name}", visible=opened)
         if strip is not None:
             with strip:
-                self._drawn.append(self._draw(self.name, first, hints[0], press))
+                self._drawn.append(self._draw(self.name, first, hints[0]))
         self.update(place, level.enabled)
 
-    def _draw(self, label: str, names: tuple[str, ...], hint: str, press: Callable[[str], None]) -> _Drawn:
+    def toggle(self) -> None:
+        """Switches the level on or off, unless another stack without it has just taken effect."""
+        for level in self._page.settings.levels:
+            if level.name == self.name:
+                on = self._enabled.ask(not self._enabled.now(level.enabled))
+                self._page.post(Set(f"levels.{self.name}.enabled", on))
+
+    def _draw(self, label: str, names: tuple[str, ...], hint: str) -> _Drawn:
         with self._gui.add_folder(None) as folder:
             text = self._gui.add_html("")
             buttons = self._gui.add_button_group(label, names, hint=hint)
@@ -77,9 +88,12 @@ class LevelRow:
             self._gui.add_html(_STYLE.format(row, _EACH * len(names), ROW))
 
         def pressed() -> None:
-            if buttons.value == MORE:
+            if buttons.value == _MORE:
                 self.details.visible = not self.details.visible
-            press(str(buttons.value))
+            elif self._move is not None and buttons.value in self._others:
+                self._move(self.name, -1 if buttons.value == _UP else 1)
+            else:
+                self.toggle()
 
         on_click(buttons, pressed)
         return _Drawn(folder, text, buttons, _EACH * len(names) + 1.5)
@@ -110,7 +124,7 @@ class LevelRow:
         line = "display:flex;justify-content:space-between;gap:0.6em;align-items:center;white-space:nowrap"
         for folder, text, buttons, room in self._drawn:
             folder.order = float(place)
-            names = (ON if on else OFF, *self._others, *buttons.options[1 + len(self._others) :])
+            names = (_ON if on else _OFF, *self._others, *buttons.options[1 + len(self._others) :])
             buttons.options = names
             text.content = (
                 f'<div style="font-size:0.85em;line-height:1.35;height:2.8em;margin:0.2em 0 0.25em 0.75em;'

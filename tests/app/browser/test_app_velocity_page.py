@@ -79,7 +79,7 @@ def mission(learner: SimulationClient) -> MissionView:
 
 def latest(learner: SimulationClient, field: str) -> np.ndarray:
     """Returns a field of the newest row of telemetry."""
-    found = learner.read(lambda _, history: history.latest[history.layout.fields[field]].copy())
+    found = learner.read(lambda recording: recording.latest[recording.layout.fields[field]].copy())
     assert found is not None
     return found
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.page.comfort import LINE
+from app.tab.comfort import LINE
 from browsing.browser_actions import key, press, row, tab, unfold
 
 RIGHT = ("Learn", "Tasks", "Control", "Robot", "More/Compare", "More/Export", "More/Help")

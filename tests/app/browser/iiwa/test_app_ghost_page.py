@@ -41,7 +41,7 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     key(page, "Space")
     assert eventually(page, lambda: learner.status is not None and not learner.status.running)
     expect(page.get_by_text("Look back [s]")).to_be_visible()
-    poses = learner.read(lambda block, _: block.poses())
+    poses = learner.read(lambda recording: recording.block.poses())
     assert poses is not None
 
     def shows_now() -> bool:

@@ -44,7 +44,7 @@ def error(learner: SimulationClient, task: str) -> float:
 
 def now(learner: SimulationClient, field: str) -> float:
     """Returns the norm of a field in the newest row."""
-    found = learner.read(lambda _, history: (history.layout, history.latest))
+    found = learner.read(lambda recording: (recording.layout, recording.latest))
     assert found is not None
     layout, latest = found
     return float(np.linalg.norm(latest[layout.fields[field]]))

@@ -54,7 +54,7 @@ def learner(server: PageServer, page: Page) -> SimulationClient:
 
 def error(learner: SimulationClient, task: str) -> float:
     """Returns ‖x̃‖ now, m or rad."""
-    row = learner.read(lambda _, history: (history.layout, history.latest))
+    row = learner.read(lambda recording: (recording.layout, recording.latest))
     assert row is not None
     layout, latest = row
     return float(np.linalg.norm(latest[layout.fields[f"error/{task}"]]))

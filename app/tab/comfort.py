@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 import viser
 
@@ -19,10 +18,6 @@ from app.adapter.names import CHART, CLOSES_NOTICE, FOLDED_PANEL, ICON_BUTTON, R
 from app.client.simulation_client import SimulationClient
 from app.html.text import joints_named, quantity
 from app.link.messages import Play
-
-if TYPE_CHECKING:
-    from app.tab.context import SessionSnapshot
-    from lessons.settings.settings import SceneSettings
 
 AT_MOST_EVERY = 2.0
 """Time, s, between two sentences."""
@@ -55,22 +50,6 @@ class Facts:
     levels: tuple[tuple[str, bool], ...]
     errors: dict[str, tuple[float, str]]
     limits: frozenset[tuple[str, str]]
-
-
-def facts_of(now: SessionSnapshot[SceneSettings]) -> Facts:
-    status = now.status
-    fields = now.ready.layout.fields
-    return Facts(
-        status.running,
-        status.resets,
-        tuple((level.name, level.enabled) for level in now.settings.levels),
-        {
-            task.name: (now.error(task.name), task.unit)
-            for task in now.ready.tasks
-            if f"error/{task.name}" in fields
-        },
-        frozenset((each.kind, each.joint) for each in status.binding),
-    )
 
 
 class Narration:
@@ -245,18 +224,29 @@ document.head.append(style);
 {names}}})()"""
 
 
+DARK = "himpc-lab-dark"
+"""The key under which a browser stores whether the theme is dark."""
+
+
 class Comfort:
-    """The line that says what happens. If the user wants less motion, a page also begins paused."""
+    """The theme, and the line that says what happens. If the user wants less motion, a page also begins
+    paused."""
 
     def __init__(
-        self, client: viser.ClientHandle, reduced: bool, window: tuple[int, int] | None = None
+        self, client: viser.ClientHandle, reduced: bool, window: tuple[int, int] | None, dark: bool
     ) -> None:
         """reduced: whether the user asked the browser for less motion; window: width and height of the
-        browser's window, pixels, if known."""
-        self._client, self._reduced, self.window = client, reduced, window
+        browser's window, pixels, if known; dark: whether the theme is dark."""
+        self._client, self._reduced, self.window, self.dark = client, reduced, window, dark
         self.says = False
         """Whether the line is on the screen. Screen readers always get it."""
         self._narration = Narration(time.monotonic)
+
+    def set_theme(self, dark: bool) -> None:
+        """Shows the dark or the light theme, with which the browser opens its next page, too."""
+        self.dark = dark
+        self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
+        self._client.local_storage.set_item(DARK, "1" if dark else "0")
 
     def opened(self, learner: SimulationClient) -> None:
         """Adds the line and the names for screen readers to a new scene, and pauses if the user wants less
@@ -281,9 +271,9 @@ class Comfort:
                 self._show("")
                 self._begin()
 
-    def follow(self, now: SessionSnapshot[SceneSettings]) -> None:
+    def follow(self, now: Facts) -> None:
         """Shows a sentence about the events since the last call."""
-        sentence = self._narration.look(facts_of(now))
+        sentence = self._narration.look(now)
         if sentence:
             self._show(sentence)
 
