@@ -25,8 +25,6 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.prediction import Choice
 from tests.robots.arms import joint, link, two_joint_arm
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 NEXT = LessonPlace("deadlines")
 
 

@@ -27,7 +27,6 @@ from app.web.server import PageServer
 from app.web.serving import greeting
 from browsing.wire import Wire, eventually
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 STEP = LessonPlace("a-redundant-arm", 0)
 LONG = 120.0
 
@@ -358,7 +357,7 @@ def test_an_address_that_phones_cannot_reach_is_said(server: PageServer) -> None
         assert lead.hear("address")["address"]["note"] == ""
 
 
-def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -> None:
+def test_a_server_without_a_class_has_none_of_its_pages() -> None:
     with served() as server:
         assert get(f"{server.url}/class")[0] == get(f"{server.url}/v/abcdef")[0] == 403
 

@@ -22,7 +22,6 @@ from app.web.serving import greeting
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 START = SceneChoice(RunSpec("planar3-hold"))
 TOKEN, ORIGIN = "the-token-of-the-proxy", "https://lab.example.org"
 

@@ -27,8 +27,6 @@ from lessons.events import Reset
 from lessons.replay.progress import read_handed_in
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 
 @pytest.fixture
 def server() -> Iterator[PageServer]:

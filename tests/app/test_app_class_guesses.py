@@ -14,7 +14,6 @@ from app.web.limits import ADDRESSES, FORGET, FREE, MOST_LATE, WrongCodes
 from app.web.server import PageServer
 
 __all__ = ["server"]
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 
 def test_guesses_are_said_and_slowed_down_and_do_not_disturb_a_phone(

@@ -102,9 +102,7 @@ def test_the_token_is_long_and_only_itself() -> None:
     assert not any(map(token.is_right, ("", token.token[:-1], token.token + "a", "\ud800é")))
 
 
-def test_pages_are_counted_also_if_a_watcher_enters_the_token_or_the_teacher_leads(
-    one_fork_server: None,
-) -> None:
+def test_pages_are_counted_also_if_a_watcher_enters_the_token_or_the_teacher_leads() -> None:
     """Otherwise an arm is not stopped after the last page, and /metrics is wrong."""
     with served(classroom=True, class_names=False) as server:
         room = server.sessions

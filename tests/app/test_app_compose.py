@@ -17,8 +17,6 @@ from himpc.catalog import CONTROLLERS
 from lessons.events import MoveTarget, Reset
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 LONG = 60.0
 
 

@@ -21,8 +21,6 @@ from app.web.server import PageServer
 from browsing.viewer import Second, Viewer
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 LONG = 240.0  # s: the first start after a checkout compiles
 TORQUE, NEAREST = "Torque, % of bound", "Joint nearest its bound, %"
 

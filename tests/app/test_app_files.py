@@ -20,8 +20,6 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 from robots import InputError
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 KEY = b"an instructor's key"
 LONG = 120.0
 

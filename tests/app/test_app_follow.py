@@ -6,15 +6,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pytest
 from served import served
 
 from app.link.messages import Post
 from app.view.camera import FollowBase
 from browsing.wire import Wire, eventually
 from lessons.events import MoveTarget
-
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 
 def test_the_camera_keeps_its_place_beside_the_base() -> None:

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-from children import LONG, Start, begun, rings
-from served import served
+from served import LONG, Start, begun, rings, served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -183,7 +182,6 @@ def test_a_ghost_goes_along_to_another_scene(start: Start) -> None:
     assert learner.ghost is ghost and learner.choice.run.scene == "iiwa14-hold"
 
 
-@pytest.mark.usefixtures("one_fork_server")
 def test_a_button_that_starts_a_process_does_not_hold_up_other_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """It starts the process on a thread: on viser's loop, all pages would wait for it."""
     waits: list[bool] = []
@@ -205,7 +203,6 @@ def test_a_button_that_starts_a_process_does_not_hold_up_other_pages(monkeypatch
     assert waits == [False]
 
 
-@pytest.mark.usefixtures("one_fork_server")
 @pytest.mark.parametrize("in_class", [False, True])
 def test_a_step_shows_its_ghost_until_it_is_hidden(in_class: bool) -> None:
     """In a class, whose robots share one computer, a learner starts the ghost with the same checkbox."""

@@ -39,7 +39,6 @@ from lessons.own.files import Folder
 from lessons.scenes.run_spec import RunSpec
 
 PROTOCOL: Any = [f"viser-v{__version__}"]
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 LONG = 60.0
 

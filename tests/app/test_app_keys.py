@@ -15,8 +15,6 @@ from app.panels.widgets.command import CAMERA_KEYS
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 
 def test_the_cameras_keys_are_those_of_viser() -> None:
     source = Path(viser.__file__).parent / "client" / "src" / "CameraControls.tsx"

@@ -69,7 +69,7 @@ def get(address: str, **headers: str) -> tuple[int, dict[str, str], str]:
         return error.code, dict(error.headers), error.read().decode()
 
 
-def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server: None) -> None:
+def test_a_full_server_sends_newcomers_away_and_takes_them_again() -> None:
     token = {HEADER: TOKEN}
     with served(token=TOKEN, refers=True) as server:
         assert get(f"{server.url}/health")[0] == 200
@@ -95,9 +95,7 @@ def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server
         assert json.loads(get(f"{server.url}/health")[2])["state"] == "stopping"
 
 
-def test_a_change_of_a_setting_loads_no_robot_in_the_server(
-    one_fork_server: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_change_of_a_setting_loads_no_robot_in_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
     """The simulation makes the code that the tab stores, which another server could open."""
     with served() as server, Wire(server.guest_link):
         assert eventually(lambda: bool(server.sessions.learners), 60.0)
@@ -123,9 +121,7 @@ def test_a_change_of_a_setting_loads_no_robot_in_the_server(
         assert loaded == []
 
 
-def test_a_code_is_opened_on_a_thread_of_the_page(
-    one_fork_server: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_code_is_opened_on_a_thread_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """On viser's loop it would stop all pages while two scenes are loaded."""
     ran: list[threading.Thread] = []
 

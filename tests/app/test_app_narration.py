@@ -96,7 +96,7 @@ def says(page: Reader, word: str) -> bool:
     return any("textContent =" in each and word in each.lower() for each in page.scripts)
 
 
-def test_a_page_without_a_mouse(one_fork_server: None) -> None:
+def test_a_page_without_a_mouse() -> None:
     """The page begins paused, because its browser asks for less motion. A field moves the target by a
     centimetre, and a button turns it by 5°. A sentence says that the simulation runs: to
     screen readers, and on the screen if these sentences are switched on."""

@@ -19,8 +19,6 @@ from app.web.server import seen_from_outside
 from app.web.serving import greeting, opened_in_a_browser
 from lessons.own.files import Folder
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 ROOT = Path(__file__).parents[2]
 LONG = 60.0
 BROWSER = """#!{python}

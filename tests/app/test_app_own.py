@@ -28,8 +28,6 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 from robots import InputError
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 HOLDS = "def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n"
 LONG = 60.0  # s
 

@@ -28,8 +28,6 @@ from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, InputError, load_robot
 from robots.errors import shortened
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 LONG = 120.0
 RUNS = """
 from pathlib import Path

@@ -17,8 +17,6 @@ from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from robots import CATALOG
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 LONG = 60.0
 PART = 500_000
 LARGE = 40_000_000

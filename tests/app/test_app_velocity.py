@@ -27,8 +27,6 @@ from lessons.events import InsertTask, MoveLevel, MoveTarget, Push, Release, Rem
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.velocity import VelocitySettings
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 RINGS = "/targets/orientation/control"
 
 

@@ -31,7 +31,6 @@ from browsing.wire import Wire, camera, eventually
 from lessons.scenes.run_spec import RunSpec
 from robots import load_robot
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 NONE = np.zeros((0, 3))
 CAMERA = vars(camera())
 GIZMO = {"name": "/target", "wxyz": (1.0, 0, 0, 0), "position": (0.5, 0, 0.5), "owner": ""}

@@ -19,7 +19,6 @@ from browsing.browser_actions import open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 
 pytestmark = [
-    pytest.mark.usefixtures("one_fork_server"),
     pytest.mark.nightly(
         *(f"app/{part}" for part in ("adapter", "classes", "client", "link", "page", "panels/run", "web")),
         "browsing/",

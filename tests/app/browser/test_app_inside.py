@@ -23,8 +23,6 @@ from lessons.events import MoveLevel, Set
 from lessons.geometry.plane import Plane
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 INSIDE = pytest.mark.nightly(
     *(f"app/{part}" for part in ("adapter", "html", "link", "page", "panels", "worker")),
     *("browsing/", "lessons/geometry", "lessons/scenes/planar"),

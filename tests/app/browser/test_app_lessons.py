@@ -27,7 +27,6 @@ from lessons.events import Set
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.lesson import Challenge, Lesson
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 BEFORE, AFTER = 120, 180
 """Largest number of words on the screen in a step, before and after its run."""
 UNSEEN = 1500

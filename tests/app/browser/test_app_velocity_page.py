@@ -34,8 +34,6 @@ from lessons.scenes.names import ALL_SCENES
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 MISSIONS = pytest.mark.nightly(
     *(f"app/{part}" for part in ("adapter", "html", "link", "page", "panels", "view", "worker")),
     *("browsing/", "himpc/htmpc", "himpc/missions", "lessons/scenes", "lessons/session", "lessons/settings"),
