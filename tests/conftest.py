@@ -58,7 +58,7 @@ class OneWorkerForWhatIsShared(LoadScopeScheduling):
 
 _LONG = (
     "tests/app/browser/",
-    "tests/app/test_app_soak.py",
+    "tests/app/test_app_memory.py",
     "tests/lessons/test_lessons_grade.py",
     "tests/app/test_app_process.py",
     "tests/lessons/test_lessons_every_controller.py",
@@ -75,7 +75,6 @@ _LONG = (
     "tests/lessons/test_lessons_switch.py",
     "tests/lessons/test_lessons_adaptation.py",
     "tests/app/test_app_lesson.py",
-    "tests/app/test_app_kept.py",
     "tests/test_wheel.py",
     "tests/test_notebook.py",
     "tests/test_examples.py",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import http.client
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from urllib.parse import urlsplit
 
 import psutil
 
@@ -14,9 +16,10 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.web.server import PageServer, ServerOptions
+from browsing.wire import Wire
 from lessons.scenes.run_spec import RunSpec
 
-LONG = 60.0
+LONG = 120.0
 """Time, s, within which everything happens also on a busy machine."""
 Start = Callable[..., SimulationClient]
 
@@ -33,6 +36,38 @@ def served(choice: SceneChoice | str = "planar3-hold", **options: Any) -> Iterat
         yield server
     finally:
         server.close()
+
+
+@contextmanager
+def visited(
+    choice: SceneChoice | str = "planar3-hold", **options: Any
+) -> Iterator[tuple[Wire, SimulationClient]]:
+    """Runs a server with one page, and yields the page and its simulation, which has begun."""
+    with served(choice, **options) as server, Wire(server.link) as page:
+        assert wait_until(lambda: bool(server.sessions.learners), LONG)
+        (learner,) = server.sessions.learners
+        assert wait_until(lambda: learner.status is not None, LONG)
+        yield page, learner
+
+
+class Page(NamedTuple):
+    """The answer to a request."""
+
+    status: int
+    headers: http.client.HTTPMessage
+    text: str
+
+
+def get(address: str, **headers: str) -> Page:
+    """Requests an address and follows no redirect. headers: with _ in place of -."""
+    parts = urlsplit(address)
+    with closing(http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=LONG)) as line:
+        named = {name.replace("_", "-"): text for name, text in headers.items()}
+        line.request(
+            "GET", parts._replace(scheme="", netloc="", path=parts.path or "/").geturl(), headers=named
+        )
+        answer = line.getresponse()
+        return Page(answer.status, answer.headers, answer.read().decode())
 
 
 def free_port() -> int:

@@ -11,8 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from served import served
-from test_app_class import LONG
+from served import LONG, served
 
 from app.classes.hall import PATIENCE, BuildQueue, Hall
 from app.client import simulation_client

@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 import re
 import threading
-import urllib.error
-import urllib.request
 from dataclasses import replace
 from http import HTTPStatus
 
 import pytest
-from served import served
+from served import get, served
 from viser import __version__
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -58,15 +56,6 @@ def test_metrics_are_prometheus_text() -> None:
     kinds = dict(line.split()[2:4] for line in lines if line.startswith("# TYPE"))
     assert kinds.keys() == samples.keys()
     assert all((kind == "counter") == name.endswith("_total") for name, kind in kinds.items())
-
-
-def get(address: str, **headers: str) -> tuple[int, dict[str, str], str]:
-    named = {name.replace("_", "-"): value for name, value in headers.items()}
-    try:
-        with urllib.request.urlopen(urllib.request.Request(address, headers=named), timeout=30) as found:
-            return found.status, dict(found.headers), found.read().decode()
-    except urllib.error.HTTPError as error:
-        return error.code, dict(error.headers), error.read().decode()
 
 
 def test_a_full_server_sends_newcomers_away_and_takes_them_again() -> None:

@@ -169,36 +169,6 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
 
 
 @MISSIONS
-def test_tasks_are_added_released_and_settings_changed(page: Page, learner: SimulationClient) -> None:
-    load(page, learner, "ridgeback-ur10-handover")
-    assert eventually(page, lambda: is_drawn(page, "/person/1"))
-    tab(page, "Control")
-    set_number(page, "δ [mm]", 25)
-    set_number(page, "N", 6)
-    set_number(page, "R inputs, arm", 0.05)
-
-    def adopted() -> bool:
-        settings = learner.settings
-        return (
-            isinstance(settings, VelocitySettings)
-            and (settings.htmpc.delta_m, settings.htmpc.horizon) == (0.025, 6)
-            and settings.htmpc.input_effort == (0.1, 0.1, 0.1, *(0.05,) * 6)
-        )
-
-    assert eventually(page, adopted)
-    set_number(page, "Speed", 0.5)
-    press(page, "Reset")  # the scene's own script also releases it, after 14 s
-    tab(page, "Tasks")
-    page.get_by_role("button", name="Release ee 1").click()
-    assert eventually(page, lambda: mission(learner).rows[1].state == "done")
-    assert eventually(page, lambda: mission(learner).people[0].balls == 1)
-    unfold(page, "Add a task")
-    press(page, "Add")
-    assert eventually(page, lambda: mission(learner).rows[-1].name == "ee added")
-    assert learner.failure is None
-
-
-@MISSIONS
 def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: SimulationClient) -> None:
     load(page, learner, "ridgeback-ur10-cluttered")
     assert eventually(page, lambda: is_drawn(page, "/obstacle_arrows/1"))
