@@ -495,16 +495,17 @@ def test_the_functions_of_the_header_refuse_and_report(folders: dict[str, Path])
     assert abs(float(z)) > 1e-3
 
 
-def test_two_controllers_are_used_in_one_file_with_two_prefixes(tmp_path: Path) -> None:
+def test_two_controllers_are_used_in_one_file_with_two_prefixes(
+    folders: dict[str, Path], tmp_path: Path
+) -> None:
     """Names, header and object file have the prefix. Two headers with one prefix are an error of the
     compiler, since the second one would vanish."""
-    needed("cc")
-    for prefix, scene in (("himpc", "iiwa14-hold"), ("right", "planar3-hold")):
-        folder = exported(scene, "x86_64-linux", tmp_path / prefix, *FEW, "--prefix", prefix)
+    right = exported("planar3-hold", "x86_64-linux", tmp_path / "right", *FEW, "--prefix", "right")
+    for prefix, folder in (("himpc", folders["iiwa14-hold"]), ("right", right)):
         assert f"{prefix}.h" in (folder / "README.md").read_text()
         shutil.copy(folder / f"{prefix}.h", tmp_path)
         shutil.copy(folder / f"{prefix}.o", tmp_path)
-    assert replayed(tmp_path / "right")[1] < 1e-9
+    assert replayed(right)[1] < 1e-9
     program = """
 #include <stdio.h>
 #include "himpc.h"
