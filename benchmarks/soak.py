@@ -1,21 +1,22 @@
 """Measures whether the server's memory, threads and handles stay constant: over time, over reconnections, and
 while learners change scenes and ghosts.
 
-    python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S]
+    python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S] [--speed X]
     python -m benchmarks.soak --every S [--minutes M] [--clients K] [--speed X] [--seed N]
 
 The program runs a server and, in a process of their own, K clients that use the page's protocol
 (benchmarks/client.py). It measures for M minutes and prints a sample a minute, and at the end faults, as
 lines of JSON. The exit code is 1 if there are faults.
 
-First form: in the first ten minutes (or the first half of a shorter run) the robots run at twice the speed
-and fill the histories for playback and export. This phase lasts until every robot has run for two minutes of
-simulated time. After the M minutes one client reloads its page N times. The memory of the server and of its
-children may then have grown by at most 5 % since the histories were full, the numbers of threads and handles
-must be the same as before, and 100 reloads may cost at most 5 MB. The measured memory is the memory that a
-process has written and does not share with other processes. Free memory is returned to the system first.
-Otherwise the memory that an allocator keeps would vary by more than a leak adds. The pages of libraries are
-not counted: their memory also varies, because they are shared only as long as another program uses them.
+First form: in the first ten minutes (or the first half of a shorter run) the robots run at 2 · X times real
+time and fill the histories for playback and export. This phase lasts until every robot has run for two
+minutes of simulated time. After the M minutes one client reloads its page N times. The memory of the server
+and of its children may then have grown by at most 5 % since the histories were full, the numbers of threads
+and handles must be the same as before, and 100 reloads may cost at most 5 MB. The measured memory is the
+memory that a process has written and does not share with other processes. Free memory is returned to the
+system first. Otherwise the memory that an allocator keeps would vary by more than a leak adds. The pages of
+libraries are not counted: their memory also varies, because they are shared only as long as another program
+uses them.
 
 With --every, each learner opens another scene, starts a ghost or ends it every S seconds, at random, after
 all have opened every scene once. The simulations run at X times real time, so that a small machine can run
@@ -121,7 +122,7 @@ def lasting(
 ) -> list[str]:
     """Returns sentences about exceeded limits."""
     fill = min(FILL, options.minutes / 2)
-    go(learners, 2.0)
+    go(learners, 2.0 * options.speed)
     watched(fill, viewers.pid)
     while not all(simulated(each) > MOST / RATE for each in learners):
         time.sleep(EVERY)

@@ -58,9 +58,9 @@ class OneWorkerForWhatIsShared(LoadScopeScheduling):
 
 _LONG = (
     "tests/app/browser/",
-    "tests/app/test_app_soak.py",
+    "tests/app/test_app_memory.py",
     "tests/lessons/test_lessons_grade.py",
-    "tests/app/test_app_rough.py",
+    "tests/app/test_app_process.py",
     "tests/lessons/test_lessons_every_controller.py",
     "tests/lessons/test_lessons_cluster.py",
     "tests/lessons/test_lessons_every_task.py",
@@ -75,8 +75,6 @@ _LONG = (
     "tests/lessons/test_lessons_switch.py",
     "tests/lessons/test_lessons_adaptation.py",
     "tests/app/test_app_lesson.py",
-    "tests/app/test_app_fork_server.py",
-    "tests/app/test_app_kept.py",
     "tests/test_wheel.py",
     "tests/test_notebook.py",
     "tests/test_examples.py",

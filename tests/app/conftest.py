@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 import viser
-from children import Start
+from served import Start
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -24,7 +24,7 @@ def viser_server() -> Iterator[viser.ViserServer]:
     server.stop()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="session", autouse=True)
 def one_fork_server() -> Iterator[None]:
     """Keeps the fork server when the servers of a test have ended."""
     kept = Spares(WORKER)
@@ -33,7 +33,7 @@ def one_fork_server() -> Iterator[None]:
 
 
 @pytest.fixture
-def start(one_fork_server: None) -> Iterator[Start]:
+def start() -> Iterator[Start]:
     """Returns a function that starts simulations of one worker; all are closed at the end. own_server: the
     test has a fork server of its own, which prepares this worker."""
     made: list[Spares] = []

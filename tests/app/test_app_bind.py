@@ -6,7 +6,7 @@ import asyncio
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 from unittest.mock import MagicMock
@@ -18,6 +18,7 @@ from viser import _messages
 from app.panels.torque.controller import ControllerPanel, HorizonPanel, add_plant
 from app.panels.velocity.controller import HtmpcPanel, add_servo_plant
 from app.panels.widgets.command import PopupWindow
+from app.panels.widgets.controls import _tenth
 from app.tab import mirror as bind
 from app.tab.mirror import Bindings, PendingEdit
 from app.web.inlet import allowed
@@ -259,3 +260,33 @@ def test_a_setting_that_names_a_group_has_a_control(name: str) -> None:
         add_plant(page)
     paths = {call.args[2](1).path for call in bound.bind.call_args_list}
     assert {each.path for each in settings.table().values() if each.shown.group} <= paths
+
+
+def test_a_control_that_goes_before_it_is_written_is_no_news() -> None:
+    class Gone:
+        """A control that was removed."""
+
+        def __init__(self) -> None:
+            object.__setattr__(self, "value", 1)
+
+        def on_update(self, back: Any) -> Any:
+            return back
+
+        def __setattr__(self, name: str, value: object) -> None:
+            raise RuntimeError(f"Cannot assign to {name!r} on a removed GuiSliderHandle.")
+
+    loop, heard = asyncio.new_event_loop(), list[Any]()
+    loop.set_exception_handler(lambda _, context: heard.append(context))
+    bindings: Bindings[int] = Bindings(lambda _: None, loop)
+    gone: Any = Gone()
+    bindings.bind(gone, lambda settings: settings, lambda _: None)  # pyright: ignore[reportArgumentType]
+    bindings.refresh(2)
+    loop.call_soon(loop.stop)
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
+        elsewhere.submit(loop.run_forever).result()
+    loop.close()
+    assert heard == []
+
+
+def test_one_click_on_a_number_changes_its_second_digit() -> None:
+    assert [_tenth(value) for value in (0.04, 0.5, 30.0)] == pytest.approx([0.001, 0.01, 0.1])

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from served import served
+from served import served, visited
 
 from app.client.moment import Moment
 from app.client.simulation_client import SimulationClient
@@ -24,8 +24,6 @@ from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.prediction import Choice
 from tests.robots.arms import joint, link, two_joint_arm
-
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 NEXT = LessonPlace("deadlines")
 
@@ -74,11 +72,11 @@ def answers(page: Wire) -> list[str]:
 
 
 def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    with served() as server, Wire(server.link) as page:
+    with visited() as (page, learner):
         assert eventually(lambda: page.find("Playback") is not None)
         before = page.find("Playback")
         assert before is not None
-        server.sessions.learners[0].send(Load(SceneChoice(RunSpec("ridgeback-ur10-drag"))))
+        learner.send(Load(SceneChoice(RunSpec("ridgeback-ur10-drag"))))
         assert eventually(lambda: page.find("Playback") not in (None, before))
         said = len(page.notices)
         told = next(each["uuid"] for each in page.made if each["props"].get("label") == LABEL)
@@ -119,5 +117,5 @@ def test_a_robot_whose_tip_has_the_name_of_a_joint_is_shown(tmp_path: Path) -> N
     file = tmp_path / "arm.urdf"
     file.write_text(two_joint_arm(link("gripper") + joint("gripper", "l2", "gripper", "fixed", "")))
     choice = SceneChoice(RunSpec("hold", urdf=str(file), tip="gripper"))
-    with served(choice) as server, Wire(server.link) as page:
+    with visited(choice) as (page, _):
         assert eventually(lambda: page.shows("Running"))

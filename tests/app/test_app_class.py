@@ -1,4 +1,5 @@
-"""A class on a real server, with phones and a teacher that use its protocol."""
+"""A class on a real server: phones and a teacher that use its protocol, guesses at its code, accounts that a
+proxy sends."""
 
 from __future__ import annotations
 
@@ -6,30 +7,33 @@ import csv
 import io
 import json
 import re
+import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import quote
 
 import pytest
-from served import served
-from test_app_load import get
+from served import LONG, get, served
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from app.__main__ import main
+from app.classes.gathering import Gathering
 from app.classes.sockets import PER_MINUTE, Newcomers
+from app.classes.views import for_teacher
 from app.classes.words import LONGEST, ONLY_HERE
 from app.client.simulation_client import STAYING, SimulationClient
 from app.link.exercise import LessonPlace
-from app.web.passes import QUERY
+from app.web import guard, limits
+from app.web.limits import ADDRESSES, FORGET, FREE, MOST_LATE, WrongCodes
+from app.web.passes import HEADER, QUERY, USER_HEADER
 from app.web.server import PageServer
 from app.web.serving import greeting
 from browsing.wire import Wire, eventually
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 STEP = LessonPlace("a-redundant-arm", 0)
-LONG = 120.0
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +53,7 @@ class Line:
             # The test reads when it needs something. A full queue would hold up the answers to pings.
             max_queue=None,
             ping_interval=None,
+            close_timeout=1.0,  # a server that slows a flood down answers late
         )
         self.told: dict[str, Any] = {}
 
@@ -100,7 +105,7 @@ def test_the_address_decides_who_is_the_teacher(server: PageServer) -> None:
     assert server.hall is not None
     code = server.hall.code
     status, headers, text = get(f"{server.url}/v/{code}")
-    assert status == 200 and "Vote" in text and "cookie" not in map(str.lower, headers)
+    assert status == 200 and "Vote" in text and "set-cookie" not in map(str.lower, headers)
     policy = headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "unsafe" not in policy
     assert headers["X-Frame-Options"] == "DENY" and not re.search(r"""(src|href)=["'](https?:)?//""", text)
@@ -126,14 +131,8 @@ def test_the_address_decides_who_is_the_teacher(server: PageServer) -> None:
 
 def cookie_of(link: str, **headers: str) -> str:
     """Returns the cookie that a link sets before it redirects to its page without the secret."""
-    import http.client
-
-    parts = urlsplit(link)
-    line = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=30)
-    line.request("GET", f"{parts.path}?{parts.query}", headers=headers)
-    answer = line.getresponse()
+    answer = get(link, **headers)
     assert (answer.status, answer.headers["Location"]) == (303, "./class")
-    line.close()
     return str(answer.headers["Set-Cookie"]).partition(";")[0]
 
 
@@ -358,7 +357,7 @@ def test_an_address_that_phones_cannot_reach_is_said(server: PageServer) -> None
         assert lead.hear("address")["address"]["note"] == ""
 
 
-def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -> None:
+def test_a_server_without_a_class_has_none_of_its_pages() -> None:
     with served() as server:
         assert get(f"{server.url}/class")[0] == get(f"{server.url}/v/abcdef")[0] == 403
 
@@ -371,3 +370,139 @@ def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
         assert main(["--no-browser", *given]) == 0
         assert asked["class_names"] is names
     assert main(["--no-browser", "--no-names"]) == 2
+
+
+# ---------------------------------------------------------------- guesses at the code
+
+
+def test_guesses_are_said_and_slowed_down_and_do_not_disturb_a_phone(
+    server: PageServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """After 20 different wrong codes all answers are late, also those to a right code; the terminal says so
+    once. A phone that is already there goes on, and one that comes is admitted."""
+    monkeypatch.setattr(guard, "DELAY", 0.5)
+    assert server.hall is not None
+    right = f"{server.url}/v/{server.hall.code}"
+
+    def asked(address: str) -> tuple[int, float]:
+        began = time.monotonic()
+        return get(address)[0], time.monotonic() - began
+
+    for _ in range(3 * FREE):
+        assert get(f"{server.url}/v/xxxxxx")[0] == 403, "the code of an earlier class"
+    assert "wrong codes" not in capfd.readouterr().err
+    with Line(right) as phone:
+        phone.send(do="hello")
+        phone.hear("seat")
+        for k in range(FREE):
+            assert get(f"{server.url}/v/guess{k}")[0] == 403
+        said = capfd.readouterr().err
+        assert said.count("127.0.0.1 sent more than 20 different wrong codes of the class") == 1
+        for address, status in ((f"{server.url}/v/guess", 403), (right, 200)):
+            found, seconds = asked(address)
+            assert found == status and seconds >= 0.5
+        phone.send(do="name", name="Max")
+        phone.hear("name")
+        with Line(right) as other:
+            other.send(do="hello")
+            assert other.hear("seat")["seat"] != phone.told["seat"]
+        monkeypatch.setattr(limits, "MOST_LATE", 1)
+        with ThreadPoolExecutor(8) as many:
+            assert 429 in many.map(lambda k: get(f"{server.url}/v/more{k}")[0], range(8))
+        assert eventually(lambda: get(right)[0] == 200, LONG)
+    assert "wrong codes" not in capfd.readouterr().err
+
+
+def test_what_is_remembered_has_bounds_and_is_forgotten() -> None:
+    now = [0.0]
+    wrong = WrongCodes(lambda: now[0])
+    for k in range(10 * FREE):
+        wrong.note("a", f"{k}" * 9000)
+        wrong.note(None, "b")
+    assert wrong.are_many("a") and not wrong.are_many(None)
+    assert sum(map(len, wrong._guesses["a"].codes)) <= 32 * (FREE + 1)
+    now[0] = FORGET + 1.0
+    assert not wrong.are_many("a")
+    for k in range(2 * ADDRESSES):
+        wrong.note(f"{k}", "x")
+    assert len(wrong._guesses) == ADDRESSES
+    for k in range(FREE + 1):
+        wrong.note("c", f"{k}")
+    waiting = [wrong.waits("c") for _ in range(MOST_LATE + 1)]
+    assert [each.__enter__() for each in waiting] == [True] * MOST_LATE + [False]
+
+
+# ---------------------------------------------------------------- accounts that a proxy sends
+
+TOKEN, ORIGIN = "the-token-of-the-proxy", "https://lab.example.org"
+
+
+@pytest.fixture(scope="module")
+def behind() -> Iterator[PageServer]:
+    named = {"token": TOKEN, "class_names": True, "proxy_only": True, "trusted_origins": [ORIGIN]}
+    with served(max_sessions=2, **named) as running:
+        yield running
+
+
+def by_proxy(account: str = "") -> dict[str, str]:
+    return {HEADER: TOKEN, USER_HEADER: quote(account)}
+
+
+def test_only_the_proxy_opens_the_pages_of_the_class(behind: PageServer) -> None:
+    """Without the proxy, neither the code of the class nor the teacher's secret opens a page."""
+    assert behind.hall is not None
+    phones, secret = f"{behind.url}/v/{behind.hall.code}", f"?{QUERY}={behind.passes.owner}"
+    for path in ("/v/xxxxxx", "/class", f"/class{secret}", "/class.csv", "/", f"/v/{behind.hall.code}"):
+        assert get(f"{behind.url}{path}")[0] == 403, path
+        assert get(f"{behind.url}{path}", **{HEADER: f"{TOKEN}x"})[0] == 403, path
+    for path in (phones, f"{behind.url}/class{secret}"):
+        with pytest.raises(InvalidStatus):
+            Line(path)
+    assert get(phones, **by_proxy())[0] == 200
+    assert get(f"{behind.url}/class", **by_proxy("zoe"))[0] == 403, "a learner is not the teacher"
+    assert behind.teachers_link == f"{ORIGIN}/class{secret}"
+    cookie = cookie_of(f"{behind.url}/class{secret}", **by_proxy("prof"))
+    assert get(f"{behind.url}/class", Cookie=cookie)[0] == 403
+    assert get(f"{behind.url}/class", Cookie=cookie, **by_proxy("prof"))[0] == 200
+    assert TOKEN not in "".join(greeting(behind))
+
+
+def test_the_account_is_the_name_of_the_row(behind: PageServer) -> None:
+    """The page does not ask for a name, the name cannot be changed, and the learner's robot is given to
+    nobody else."""
+    hall = behind.hall
+    assert hall is not None
+    lead = Line(f"{behind.url}/class?{QUERY}={behind.passes.owner}", **by_proxy("prof"))
+    with lead, Wire(behind.url, by_proxy("zoë")) as page:
+        while not lead.hear("class")["class"]["rows"]:
+            pass
+        (row,) = lead.told["class"]["rows"]
+        assert row["name"] == "zoë"
+        assert eventually(lambda: page.shows("Your teacher sees your account, <b>zoë</b>"), LONG)
+        assert not any("Only your teacher" in str(each) for each in page.made), "it asks for no name"
+        (learner,) = behind.sessions.learners
+        hall.call(learner.token, "somebody else")
+        assert hall.name_of(learner.token) == "zoë"
+    assert eventually(lambda: not learner.attached, LONG)
+    enter = behind.sessions.enter
+    other = enter([learner.token], print, "max")
+    assert other is not None and other is not learner
+    assert enter([learner.token], print, "zoë") is learner
+
+
+def test_an_account_keeps_its_row_and_names_may_be_left_out() -> None:
+    """Another browser with the same account continues in the same row. A class without names stores no
+    account."""
+    begun = Gathering().entered("one", "robot", 0.0, "zoe").entered("two", "robot", 0.0, "max")
+    left = begun.going_to(STEP).opened().voted("one", 0, 1.0).left("one")
+    assert left.succeeded("new", ["one"], "max") == left, "a browser that both used proves nothing"
+    again = left.succeeded("new", [], "zoe").entered("new", "robot", 2.0, "zoe")
+    assert [(each.number, each.name) for each in again.members.values()] == [(1, "zoe"), (2, "max")]
+    assert again.poll is not None and again.poll.latest == {"new": 0}
+    nameless = Gathering(named=False).entered("one", "robot", 0.0, "zoe")
+    assert "zoe" not in repr(nameless) and for_teacher(nameless, 0.0)["rows"][0]["name"] == ""
+
+
+def test_the_command_asks_for_the_address_of_the_proxy(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--no-browser", "--class", "--proxy-only"]) == 2
+    assert "--trusted-origin https://lab.example.org" in capsys.readouterr().err

@@ -11,8 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from served import served
-from test_app_class import LONG
+from served import LONG, served
 
 from app.classes.hall import PATIENCE, BuildQueue, Hall
 from app.client import simulation_client
@@ -26,8 +25,6 @@ from browsing.wire import Wire, eventually
 from lessons.events import Reset
 from lessons.replay.progress import read_handed_in
 from lessons.scenes.run_spec import RunSpec
-
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from test_app_class import LONG, STEP, Line, cookie_of
-from test_app_load import get
+from served import LONG, get
+from test_app_class import STEP, Line, cookie_of
 from websockets.exceptions import InvalidStatus
 
 from app.classes.gathering import Gathering

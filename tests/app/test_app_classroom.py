@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from served import served
+from served import LONG, served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -22,7 +22,6 @@ from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
 ROOT = Path(__file__).parents[2] / "app"
-LONG = 60.0
 
 
 def test_watchers_change_nothing() -> None:
@@ -102,18 +101,26 @@ def test_the_token_is_long_and_only_itself() -> None:
     assert not any(map(token.is_right, ("", token.token[:-1], token.token + "a", "\ud800é")))
 
 
-def test_pages_are_counted_also_if_a_watcher_enters_the_token_or_the_teacher_leads(
-    one_fork_server: None,
-) -> None:
-    """Otherwise an arm is not stopped after the last page, and /metrics is wrong."""
+def test_only_the_token_steers_and_all_pages_are_counted() -> None:
+    """A page without the token shows the same robot and cannot stop it; with the token it can. Pages are also
+    counted if a watcher enters the token or the teacher leads; otherwise /metrics would be wrong."""
     with served(classroom=True, class_names=False) as server:
         room = server.sessions
         assert isinstance(room, Classroom)
         assert server.guard.load.attached == 0
         with Wire(server.guest_link) as page:
+            (learner,) = room.learners
+            assert eventually(lambda: page.shows("you are watching"), LONG)
+            page.use("Playback", "Pause")
+            assert eventually(lambda: any(STEERING in body for _, body in page.notices), LONG)
+            assert learner.status is not None and learner.status.running
+            page.use("Instructor's token", "wrong")
+            assert eventually(lambda: page.shows("That is not the token."), LONG)
             page.use("Instructor's token", room.token)
             assert eventually(lambda: page.find("Instructor's token") is None, LONG)
-            assert server.guard.load.attached == 1
+            assert server.guard.load.attached == 1 and not page.shows("you are watching")
+            page.use("Playback", "Pause")
+            assert eventually(lambda: learner.status is not None and not learner.status.running, LONG)
             with Wire(server.link):
                 assert eventually(lambda: room.pages == 2, LONG)
             assert eventually(lambda: room.pages == 1, LONG)

@@ -1,5 +1,5 @@
-"""The amount of data that a page receives: only visible charts, few points per curve, and no more than the
-client reads."""
+"""The amount of data that a page receives: only visible charts, few points per curve, no more than the client
+reads, and as often as something moves."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from served import served
+from served import LONG, served
 from viser import ClientHandle
 
 from app.adapter import private
@@ -16,14 +16,12 @@ from app.client.recording import decimate
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
+from app.page.page import CALM, LEAST, PLOTS, POSES, STILL, TEXTS, Cadence
 from app.panels.widgets.chart import _TOP, _axis
 from app.web.server import PageServer
 from browsing.viewer import Second, Viewer
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
-LONG = 240.0  # s: the first start after a checkout compiles
 TORQUE, NEAREST = "Torque, % of bound", "Joint nearest its bound, %"
 
 
@@ -149,3 +147,28 @@ def test_axes_have_a_few_round_ticks() -> None:
     assert list(axis["values"]) == ["-100", "-50", "0", "50", "100"]  # pyright: ignore
     assert np.allclose(axis["splits"], _TOP * (np.array([-100, -50, 0, 50, 100]) + 120) / 240)  # pyright: ignore
     assert _axis((-3.0, 3.0), log=True)["values"][0] == "0.001"  # pyright: ignore
+
+
+def looks(cadence: Cadence, begin: float, end: float, moves: bool, pace: float) -> tuple[float, float, float]:
+    """Returns the numbers of looks, plots and texts per second."""
+    now, seen = begin, [0, 0, 0]
+    while now < end:
+        seen[0] += 1
+        seen[1] += cadence.plots_due(now)
+        seen[2] += cadence.texts_due(now)
+        now += cadence.shown(now if moves else "here", pace, now)
+    return seen[0] / (end - begin), seen[1] / (end - begin), seen[2] / (end - begin)
+
+
+def test_a_page_is_updated_as_often_as_something_moves() -> None:
+    cadence = Cadence()
+    fast = looks(cadence, 0.0, 10.0, moves=True, pace=1.0)
+    assert abs(fast[0] - POSES) < 0.5 and abs(fast[1] - PLOTS) < 0.5 and abs(fast[2] - TEXTS) < 0.5
+    slowed = looks(cadence, 10.0, 20.0, moves=True, pace=0.1)
+    assert abs(slowed[0] - LEAST * POSES) < 0.5 and abs(slowed[1] - LEAST * PLOTS) < 0.5
+    assert slowed[2] > 0.8 * TEXTS, "texts come as soon in slowed time"
+    looks(cadence, 20.0, 20.0 + 2 * STILL, moves=False, pace=1.0)
+    still = looks(cadence, 30.0, 40.0, moves=False, pace=1.0)
+    assert all(abs(rate - CALM) < 0.5 for rate in still)
+    again = looks(cadence, 40.0, 50.0, moves=True, pace=1.0)
+    assert abs(again[0] - POSES) < 0.5, "and as soon as it moves, as often as before"

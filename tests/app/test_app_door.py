@@ -11,16 +11,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from app.web.door import Answer, Door, as_origin, under_its_name
-from app.web.passes import (
-    HEADER,
-    QUERY,
-    USER_HEADER,
-    VARIABLE,
-    Passes,
-    given_token,
-    new_token,
-    shared,
-)
+from app.web.passes import HEADER, QUERY, USER_HEADER, VARIABLE, Passes, given_token, new_token, shared
 from robots import InputError
 
 OURS = "127.0.0.1:8080"

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
-import os
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import psutil
 import pytest
-from children import LONG, Start, begun, rings
-from served import served
+from served import LONG, Start, begun, rings, visited
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
-from app.link.process import receive, send, wait_until
+from app.link.process import wait_until
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
-from browsing.wire import Wire, eventually
+from browsing.wire import eventually
 from lessons.events import Push, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
@@ -148,23 +144,6 @@ def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(start: Start) -
     assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)
 
 
-def test_a_scene_that_comes_too_late_leaves_no_memory(start: Start) -> None:
-    """A `Ready` message that arrives after the learner was closed is discarded and its memory is released."""
-    learner = begun(start)
-    learner.close()
-    late = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
-    ends: tuple[Any, Any] = multiprocessing.Pipe()
-    here, there = ends
-    send(there, late.ready())
-    ready = receive(here)
-    assert os.fstat(ready.block)
-    learner._hear(learner._process, ready)
-    with pytest.raises(OSError):
-        os.fstat(ready.block)
-    for each in (here, there, late):
-        each.close()
-
-
 def test_a_ghost_goes_along_to_another_scene(start: Start) -> None:
     learner = begun(start)
     learner.start_ghost(Ghost("N = 1", ("horizon=1",)))
@@ -183,7 +162,6 @@ def test_a_ghost_goes_along_to_another_scene(start: Start) -> None:
     assert learner.ghost is ghost and learner.choice.run.scene == "iiwa14-hold"
 
 
-@pytest.mark.usefixtures("one_fork_server")
 def test_a_button_that_starts_a_process_does_not_hold_up_other_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """It starts the process on a thread: on viser's loop, all pages would wait for it."""
     waits: list[bool] = []
@@ -197,23 +175,20 @@ def test_a_button_that_starts_a_process_does_not_hold_up_other_pages(monkeypatch
             waits.append(True)
 
     monkeypatch.setattr(SimulationClient, "start_ghost", start_ghost)
-    with served() as server, Wire(server.link) as page:
-        assert eventually(lambda: page.find("Start the ghost") is not None, LONG)
+    with visited() as (page, _):
         page.use("Ghost's controller", "osf")
         page.use("Start the ghost")
         assert eventually(lambda: bool(waits))
     assert waits == [False]
 
 
-@pytest.mark.usefixtures("one_fork_server")
 @pytest.mark.parametrize("in_class", [False, True])
 def test_a_step_shows_its_ghost_until_it_is_hidden(in_class: bool) -> None:
     """In a class, whose robots share one computer, a learner starts the ghost with the same checkbox."""
     place = LessonPlace("a-redundant-arm", 2)
     names = False if in_class else None
-    with served(SceneChoice.of_lesson(place), class_names=names) as server, Wire(server.guest_link) as page:
+    with visited(SceneChoice.of_lesson(place), class_names=names) as (page, learner):
         assert eventually(lambda: page.find("Ghost") is not None, LONG)
-        (learner,) = server.sessions.learners
         switch = str(page.find("Ghost"))
         assert eventually(lambda: learner.lecture is not None, LONG)
         assert page.controls[switch]["value"] is not in_class

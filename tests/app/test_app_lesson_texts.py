@@ -1,4 +1,4 @@
-"""Progress, texts, words and pictures of the lessons."""
+"""Progress, texts, words and pictures of the lessons, and the cards of their exercises."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from html import escape
 from unittest.mock import MagicMock
 
 import numpy as np
@@ -15,15 +16,16 @@ import pytest
 from app.client.progress import Notebook
 from app.html.markdown import explained, rendered, rendered_line, split, word_count, words
 from app.html.palette import GHOST
-from app.html.text import figure, joints_named, readable
+from app.html.text import figure, formula, joints_named, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
-from app.panels.lesson.cards import GROUPS, PATHS
+from app.panels.lesson.cards import GROUPS, PATHS, belonging_to, card, exercise_cards
 from app.panels.lesson.claims import pictures, state
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.controls import STEPS, place_of, value_at
 from himpc.tasks import KINDS
 from lessons.course import COURSE, load_lesson
+from lessons.exercises import EXERCISES, load_exercise, start_of
 from lessons.replay.progress import LearnerProgress, progress_from
 from lessons.teaching.prediction import Choice, PredictionResult, Value
 
@@ -121,7 +123,8 @@ def test_places_of_a_logarithmic_slider_come_back() -> None:
 
 def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     assert figure(0.012345, "mm") == "0.0123 mm" and figure(math.nan) == "–" and figure(30.0, "deg") == "30°"
-    assert figure(3850.0, "%") == "3850 %" and figure(2e5) == "2·10⁵"
+    assert figure(3850.0, "%") == "3850 %" and figure(2e5) == "2·10⁵" and figure(2.0, "deg/s") == "2°/s"
+    assert readable("turns by 3 deg, in degrees") == "turns by 3°, in degrees"
     assert readable("It was 3.56e+03 %, not 2.1e-07 deg.") == "It was 3560 %, not 2.1·10⁻⁷°."
     assert figure(-2.5e-9) == "−2.5·10⁻⁹"
     assert readable("9.96e-04 m and 9.97e+05 N") == "1·10⁻³ m and 1·10⁶ N"
@@ -228,3 +231,36 @@ def test_a_joint_has_one_name() -> None:
     ), "the predicted number of joints is plotted, with its bound"
     drawn = pictures(load_lesson("two-tasks").steps[1], lecture)
     assert "≥ 200 mm" in drawn and "≥ 100 mm" not in drawn, "of two bounds the stricter one"
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_an_exercise_has_its_card_and_ends_its_lesson(name: str) -> None:
+    exercise = load_exercise(name)
+    for html in (exercise_cards(), belonging_to(exercise.lesson)):
+        assert f"--from {name}" in html
+        assert f"--scene {exercise.scene} --controller" in html
+        assert formula(exercise.equation) in html
+        assert all(escape(check.text) in html for check in exercise.checks(0))
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_the_hints_of_an_exercise_open_one_by_one(name: str) -> None:
+    """Each hint is nested inside the previous one."""
+    hints = load_exercise(name).hints
+    opened = card(load_exercise(name)).split("<summary>Hint ")
+    assert [each[0] for each in opened[1:]] == [str(number) for number in range(1, len(hints) + 1)]
+    assert "</details>" not in "".join(opened[1:-1])
+    assert opened[-1].count("</details>") == len(hints)
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_the_file_with_the_hole_names_a_scene_of_its_checks(name: str) -> None:
+    line = next(each for each in start_of(name).splitlines() if "--scene" in each)
+    scenes = {check.run.scene for check in load_exercise(name).checks(0)}
+    assert line.split("--scene ")[1].split()[0] in scenes
+
+
+def test_other_lessons_lead_to_none() -> None:
+    own = {load_exercise(name).lesson for name in EXERCISES}
+    assert own <= set(COURSE)
+    assert all((belonging_to(name) == "") == (name not in own) for name in COURSE)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 import re
 import threading
-import urllib.error
-import urllib.request
 from dataclasses import replace
 from http import HTTPStatus
 
 import pytest
-from served import served
+from served import get, served
 from viser import __version__
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -60,16 +58,7 @@ def test_metrics_are_prometheus_text() -> None:
     assert all((kind == "counter") == name.endswith("_total") for name, kind in kinds.items())
 
 
-def get(address: str, **headers: str) -> tuple[int, dict[str, str], str]:
-    named = {name.replace("_", "-"): value for name, value in headers.items()}
-    try:
-        with urllib.request.urlopen(urllib.request.Request(address, headers=named), timeout=30) as found:
-            return found.status, dict(found.headers), found.read().decode()
-    except urllib.error.HTTPError as error:
-        return error.code, dict(error.headers), error.read().decode()
-
-
-def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server: None) -> None:
+def test_a_full_server_sends_newcomers_away_and_takes_them_again() -> None:
     token = {HEADER: TOKEN}
     with served(token=TOKEN, refers=True) as server:
         assert get(f"{server.url}/health")[0] == 200
@@ -95,9 +84,7 @@ def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server
         assert json.loads(get(f"{server.url}/health")[2])["state"] == "stopping"
 
 
-def test_a_change_of_a_setting_loads_no_robot_in_the_server(
-    one_fork_server: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_change_of_a_setting_loads_no_robot_in_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
     """The simulation makes the code that the tab stores, which another server could open."""
     with served() as server, Wire(server.guest_link):
         assert eventually(lambda: bool(server.sessions.learners), 60.0)
@@ -123,9 +110,7 @@ def test_a_change_of_a_setting_loads_no_robot_in_the_server(
         assert loaded == []
 
 
-def test_a_code_is_opened_on_a_thread_of_the_page(
-    one_fork_server: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_code_is_opened_on_a_thread_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """On viser's loop it would stop all pages while two scenes are loaded."""
     ran: list[threading.Thread] = []
 

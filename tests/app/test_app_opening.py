@@ -1,10 +1,11 @@
-"""How the page is opened in the owner's browser, and the addresses that are printed."""
+"""How the server starts and ends: wrong addresses, the owner's browser, the addresses that are printed."""
 
 from __future__ import annotations
 
 import os
 import re
 import signal
+import socket
 import stat
 import subprocess
 import sys
@@ -12,17 +13,18 @@ from pathlib import Path
 
 import psutil
 import pytest
-from served import served
+from served import LONG, served
 
+from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.web.server import seen_from_outside
+from app.web import server as module
+from app.web.server import FIRST, PageServer, ServerOptions, seen_from_outside
 from app.web.serving import greeting, opened_in_a_browser
 from lessons.own.files import Folder
-
-pytestmark = pytest.mark.usefixtures("one_fork_server")
+from lessons.scenes.run_spec import RunSpec
+from robots import InputError
 
 ROOT = Path(__file__).parents[2]
-LONG = 60.0
 BROWSER = """#!{python}
 import sys, time, pathlib
 said = pathlib.Path({said!r})
@@ -43,7 +45,8 @@ def browser(tmp_path: Path) -> Path:
 
 def test_no_argument_list_holds_what_the_browser_is_opened_with(browser: Path, tmp_path: Path) -> None:
     """Every user of the machine can read argument lists. The browser therefore opens a file that no other
-    user can read; it redirects to the page, and is deleted at the end."""
+    user can read; it redirects to the page. After SIGTERM (for Ctrl-C see test_commands_interrupted.py), file
+    and processes are gone, and only one line was printed."""
     places = tmp_path / "places"
     places.mkdir()
     with subprocess.Popen(
@@ -51,6 +54,7 @@ def test_no_argument_list_holds_what_the_browser_is_opened_with(browser: Path, t
         cwd=ROOT,
         env={**os.environ, "BROWSER": str(browser), "TMPDIR": str(places)},
         stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
         umask=0,
     ) as lab:
@@ -72,12 +76,17 @@ def test_no_argument_list_holds_what_the_browser_is_opened_with(browser: Path, t
             assert stat.S_IMODE(file.stat().st_mode) == 0o600
             assert stat.S_IMODE(file.parent.stat().st_mode) == 0o700
         finally:
-            browsers = psutil.Process(lab.pid).children(recursive=True)
+            started = {each: each.cmdline() for each in psutil.Process(lab.pid).children(recursive=True)}
+            browsers = [each for each, words in started.items() if str(browser) in words]
+            children = [each for each in started if each not in browsers]
             lab.send_signal(signal.SIGTERM)
             lab.wait(LONG)
             for each in browsers:
                 if each.is_running():
                     each.kill()
+            said, errors = lab.communicate()
+    assert (lab.returncode, said) == (0, "") and "Traceback" not in errors, errors
+    assert len(children) > 1 and wait_until(lambda: not any(each.is_running() for each in children), LONG)
     assert not file.exists() and not file.parent.exists()
 
 
@@ -124,3 +133,31 @@ def test_no_token_says_what_it_gives_up() -> None:
         first, told = greeting(server)
         assert first == f"himpc-lab ready at {server.url}"
         assert "--no-token: every user of this machine" in told
+
+
+def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=r"in use.*--port"):
+            PageServer(FIRST, ServerOptions(port=port))
+    with pytest.raises(InputError, match="--host"):
+        PageServer(FIRST, ServerOptions(host="203.0.113.7", port=0))
+    with pytest.raises(InputError, match="Port 70000"):
+        PageServer(FIRST, ServerOptions(port=70_000))
+    with pytest.raises(InputError, match="iiwa14-hold"):
+        PageServer(SceneChoice(RunSpec("iiwa14-hodl")), ServerOptions())
+    with pytest.raises(InputError):
+        PageServer(SceneChoice(RunSpec("hold", "/nowhere.urdf")), ServerOptions())
+    with pytest.raises(InputError, match="1 or more"):
+        PageServer(FIRST, ServerOptions(max_sessions=0))
+
+
+def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        monkeypatch.setattr(module, "check_address", lambda *_: None)
+        with pytest.raises(InputError, match="is in use"):
+            PageServer(FIRST, ServerOptions(port=taken.getsockname()[1], max_sessions=1))

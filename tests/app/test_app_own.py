@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from served import served
+from served import LONG, visited
 
 from app.link.choice import SceneChoice
 from app.link.messages import Lead, Load, LoadRefused, Post, Ready
@@ -18,7 +18,7 @@ from app.link.process import wait_until
 from app.worker import torque
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
-from browsing.wire import Wire, eventually
+from browsing.wire import eventually
 from lessons.authoring.new import text_of
 from lessons.events import Set
 from lessons.own.load import judged
@@ -28,10 +28,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 from robots import InputError
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 HOLDS = "def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n"
-LONG = 60.0  # s
 
 
 @pytest.fixture
@@ -132,9 +129,8 @@ def test_own_code_is_known_by_its_content(body: SimulationRunner, file: Path) ->
 
 def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
     choice = SceneChoice.starting("planar3-hold", controller=str(file))
-    with served(choice) as server, Wire(server.link) as page:
+    with visited(choice) as (page, learner):
         assert eventually(lambda: page.shows("a controller of your own"))
-        learner = server.sessions.learners[0]
         assert eventually(lambda: learner.status is not None and learner.status.own is not None)
         file.write_text("def torque(now)\n    return 1\n")
         assert eventually(lambda: page.shows("The previous code continues to run."))
@@ -162,7 +158,7 @@ def test_a_saved_lesson_is_shown_at_the_same_step(tmp_path: Path) -> None:
     file = tmp_path / "lesson.md"
     text = text_of("lesson", None, "lesson.md")
     file.write_text(text)
-    with served(SceneChoice.opening(str(file))) as server, Wire(server.link) as page:
+    with visited(SceneChoice.opening(str(file))) as (page, _):
         assert eventually(lambda: page.shows("The hand carries 2 kg"), LONG)
         file.write_text(text.replace("- run:", "- runs:"))
         assert eventually(lambda: page.shows("line 15, column 3: There is no key"), LONG)

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from served import answers, free_port, served
+from served import LONG, answers, free_port, served
 from viser import __version__
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -42,7 +42,6 @@ from lessons.scenes.run_spec import RunSpec
 PAGE = Path(__file__).parents[2] / "docs" / "serving.md"
 NAME = "lab.example.org"
 PROTOCOL: Any = [f"viser-v{__version__}"]
-LONG = 60.0
 NGINX = pytest.mark.nightly("app/web", "docs/serving.md")
 
 

@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Iterator
 
 import pytest
-from served import served
+from served import LONG, served
 from viser import _messages
 
 from app.adapter import private
@@ -17,9 +17,6 @@ from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from robots import CATALOG
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
-LONG = 60.0
 PART = 500_000
 LARGE = 40_000_000
 

@@ -9,7 +9,7 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
-from served import served
+from served import visited
 
 from app.client.recording import Recording
 from app.html.text import free_name
@@ -20,14 +20,12 @@ from app.panels.velocity.mission import RolesPanel
 from app.view.goals import open_row
 from app.worker.main import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
-from browsing.wire import Wire, eventually
+from browsing.wire import eventually
 from himpc import Level
 from himpc.rotation import exp3, from_quaternion, log3, quaternion
 from lessons.events import InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.velocity import VelocitySettings
-
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 RINGS = "/targets/orientation/control"
 
@@ -205,10 +203,8 @@ def test_an_arm_turns_its_hand_as_it_is_told() -> None:
 
 
 def test_rings_on_the_page_turn_the_hand_of_an_arm() -> None:
-    with served("panda-htmpc") as server, Wire(server.link) as page:
+    with visited("panda-htmpc") as (page, learner):
         assert eventually(lambda: page.shows("turn it by its rings"))
-        learner = server.sessions.learners[0]
-        assert eventually(lambda: learner.status is not None and learner.status.ticks > 0)
         assert learner.status is not None
         before = learner.status.targets["orientation"]
         assert eventually(lambda: RINGS in page.controls_3d)

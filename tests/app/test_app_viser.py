@@ -1,17 +1,24 @@
-"""viser's private names that `app.adapter` uses. viser documents none of them, and a new version may lack
-some. `pyproject.toml` admits only versions that passed these tests."""
+"""viser's private names that `app.adapter` uses, and the classes that it puts in place of viser's. viser
+documents no private name, and a new version may lack some. `pyproject.toml` admits only versions that passed
+these tests."""
 
 from __future__ import annotations
 
+import asyncio
 import socket
+import threading
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 import viser
 from viser import _messages, infra
 
 from app.adapter import names, private
+from app.adapter.private import ThreadSafeEvent, fast
 from app.web.door import Door
 from app.web.guard import ConnectionGuard
 from robots import InputError
@@ -131,3 +138,66 @@ def test_a_server_opens_no_public_tunnel(server: viser.ViserServer) -> None:
         kind for kind, found in handlers.items() if found
     }
     assert isinstance(server._websock_server, infra.WebsockServer)
+
+
+SENT = (
+    (_messages.SetPositionMessage, ("/robot/1", (0.1, -0.2, 0.3))),
+    (_messages.SetOrientationMessage, ("/robot/1", (1.0, 0.0, 0.0, 0.0))),
+)
+
+
+@pytest.mark.parametrize(("kind", "fields"), SENT)
+def test_a_plain_message_is_visers_own(kind: type[Any], fields: tuple[object, ...]) -> None:
+    ours, own = fast(kind)(*fields), kind(*fields)
+    assert isinstance(ours, kind) and type(ours).as_serializable_dict is not kind.as_serializable_dict
+    assert ours.as_serializable_dict([]) == own.as_serializable_dict([])
+    assert ours.redundancy_key() == own.redundancy_key()
+    assert ours.entity_state_key() == own.entity_state_key()
+
+
+class Meeting(deque[Any]):
+    """Replaces an event's list of waiters. Another thread sets the event just before the first waiter starts
+    to wait."""
+
+    def __init__(self, event: asyncio.Event) -> None:
+        super().__init__()
+        self._event = event
+        self._met = False
+
+    def append(self, waiter: Any) -> None:
+        if not self._met:
+            self._met = True
+            thread = threading.Thread(target=self._event.set)
+            thread.start()
+            thread.join()
+        super().append(waiter)
+
+
+async def wakes(event: asyncio.Event) -> bool:
+    """Returns whether a waiter wakes up if another thread sets the event at that moment, by this call or by a
+    later one."""
+    event._waiters = Meeting(event)  # pyright: ignore[reportAttributeAccessIssue]
+    waiter = asyncio.ensure_future(event.wait())
+    await asyncio.sleep(0.1)
+    asyncio.get_running_loop().call_soon_threadsafe(event.set)
+    done, _ = await asyncio.wait([waiter], timeout=0.5)
+    waiter.cancel()
+    return bool(done)
+
+
+def test_a_sender_wakes_though_it_is_called_while_it_goes_to_sleep() -> None:
+    async def both() -> tuple[bool, bool]:
+        return await wakes(ThreadSafeEvent(asyncio.get_running_loop())), await wakes(asyncio.Event())
+
+    with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
+        ours, plain = elsewhere.submit(lambda: asyncio.run(both())).result()
+    assert ours
+    assert not plain  # otherwise `ThreadSafeEvent` is no longer needed
+
+
+def test_a_call_after_the_end_is_no_error() -> None:
+    loop = asyncio.new_event_loop()
+    event = ThreadSafeEvent(loop)
+    loop.close()
+    event.set()
+    assert not event.is_set()

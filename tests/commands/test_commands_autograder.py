@@ -1,13 +1,5 @@
-"""Grades in the formats of other systems, compared with the published descriptions; and the folder of an
-autograder.
-
-Sources, read on 2026-11-24:
-
-- Gradescope: https://gradescope-autograders.readthedocs.io/en/latest/specs/ ("Autograder Specifications"),
-  also github.com/gradescope/autograder_samples, docs/specs.md. Its lines are quoted below.
-- GitHub Classroom: github.com/github-education-resources/autograding-grading-reporter, src/main.js,
-  src/console-results.js, src/aggregate-results.js and src/notify-classroom.js: what the reporter reads.
-"""
+"""Grades in the formats of other systems, compared with the published descriptions (gradescope.json and
+github_classroom.json, with their sources); and the folder of an autograder."""
 
 from __future__ import annotations
 
@@ -30,75 +22,10 @@ from lessons.exercises import start_of
 from lessons.exercises.result import CheckResult, Grade, github, gradescope
 
 ROOT = Path(__file__).parents[2]
-VISIBILITY = ["hidden", "after_due_date", "after_published", "visible"]
-GRADESCOPE: dict[str, Any] = {
-    "type": "object",
-    # "score": 44.0, // optional, but required if not on each test case below. Overrides total of tests
-    # "tests": // Optional, but required if no top-level score
-    "anyOf": [{"required": ["score"]}, {"required": ["tests"]}],
-    "additionalProperties": False,
-    "properties": {
-        "score": {"type": "number"},
-        "execution_time": {"type": "number"},
-        "output": {"type": "string"},
-        "output_format": {"enum": ["text", "html", "simple_format", "md", "ansi"]},
-        "test_output_format": {"enum": ["text", "html", "simple_format", "md", "ansi"]},
-        "test_name_format": {"enum": ["text", "html", "simple_format", "md", "ansi"]},
-        "visibility": {"enum": VISIBILITY},
-        "stdout_visibility": {"enum": VISIBILITY},
-        "extra_data": {"type": "object"},
-        "tests": {
-            "type": "array",
-            "items": {
-                "type": "object",
-                "required": ["score"],
-                "additionalProperties": False,
-                "properties": {
-                    "score": {"type": "number"},
-                    "max_score": {"type": "number"},
-                    # "status": "passed", // optional, see "Test case status" below
-                    "status": {"enum": ["passed", "failed"]},
-                    "name": {"type": "string"},
-                    "name_format": {"enum": ["text", "html", "simple_format", "md", "ansi"]},
-                    "number": {"type": "string"},
-                    "output": {"type": "string"},
-                    "output_format": {"enum": ["text", "html", "simple_format", "md", "ansi"]},
-                    "tags": {"type": "array", "items": {"type": "string"}},
-                    "visibility": {"enum": VISIBILITY},
-                    "extra_data": {"type": "object"},
-                },
-            },
-        },
-        "leaderboard": {"type": "array"},
-    },
-}
-GITHUB: dict[str, Any] = {
-    "type": "object",
-    # results.max_score, results.status and results.tests are read; the score is that of the tests
-    "required": ["status", "max_score", "tests"],
-    "properties": {
-        "version": {"const": 1},
-        "status": {"enum": ["pass", "fail", "error"]},
-        "max_score": {"type": "number"},
-        "tests": {
-            "type": "array",
-            "minItems": 1,  # the reporter divides by the number of tests
-            "items": {
-                "type": "object",
-                "required": ["name", "status", "score"],
-                "properties": {
-                    "name": {"type": "string"},
-                    "status": {"enum": ["pass", "fail", "error"]},
-                    "score": {"type": "number"},
-                    "message": {"type": "string"},
-                    "test_code": {"type": "string"},
-                    "filename": {"type": "string"},
-                    "line_no": {"type": "integer"},
-                },
-            },
-        },
-    },
-}
+GRADESCOPE, GITHUB = (
+    json.loads(Path(__file__).with_name(f"{name}.json").read_text())
+    for name in ("gradescope", "github_classroom")
+)
 LINES = (
     CheckResult("It stays.", 0.1, "mm", "≤ 1 mm", 4, 4, ""),
     CheckResult("It comes back.", math.nan, "mm", "≤ 1 mm", 0, 6, "the robot was out of control at 0.20 s"),

@@ -13,17 +13,7 @@ import pytest
 from app.__main__ import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-NUMERICS = (
-    "numpy",
-    "scipy",
-    "pinocchio",
-    "mujoco",
-    "numba",
-    "trimesh",
-    "coal",
-    "daqp",
-    "matplotlib",
-)
+NUMERICS = ("numpy", "scipy", "pinocchio", "mujoco", "numba", "trimesh", "coal", "daqp", "matplotlib")
 
 WATCHED = f"""
 import sys
@@ -61,12 +51,7 @@ assert "mujoco" in sys.modules and "glfw" not in sys.modules
 """
     environment = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
     done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, "-c", code], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
 

@@ -14,6 +14,7 @@ import pytest
 from app.__main__ import main
 from app.commands.output import machine_failure
 from lessons.outputs import write_files
+from lessons.parallel import one_by_one
 
 ROOT = Path(__file__).parents[2]
 FULL = Path("/dev/full")
@@ -62,8 +63,11 @@ def test_a_full_disk_leaves_old_results_whole(tmp_path: Path) -> None:
     ],
     ids=lambda line: line[0],
 )
-def test_every_command_that_writes_says_one_sentence(line: list[str], tmp_path: Path) -> None:
+def test_every_command_that_writes_says_one_sentence(
+    line: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With a full disk no command leaves a file of which only the beginning was written."""
+    monkeypatch.setattr("lessons.parallel.on_cores", one_by_one)
     where = [str(tmp_path / word) if word in (".", "mine.py", "folder") else word for word in line]
     if line[0] == "sweep":  # with the folder of a sweep that is complete, only results.json is written
         assert main(where) == 0
@@ -77,7 +81,8 @@ def test_every_command_that_writes_says_one_sentence(line: list[str], tmp_path: 
         assert set(tmp_path.iterdir()) == set(held)
 
 
-def test_a_sweep_continues_after_the_disk_was_full(tmp_path: Path) -> None:
+def test_a_sweep_continues_after_the_disk_was_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lessons.parallel.on_cores", one_by_one)
     line = ["sweep", "planar3-hold", "--duration", "0.02", "--over", "Q=1:2:3", "--out", str(tmp_path)]
     assert_one_sentence(limited("ulimit -f 2", *line), "--out", "continues")
     assert main(line) == 0

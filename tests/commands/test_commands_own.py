@@ -11,6 +11,7 @@ import pytest
 from app.__main__ import main
 from lessons.authoring.new import TASKS
 from lessons.exercises import EXERCISES
+from lessons.parallel import one_by_one
 
 
 @pytest.fixture(autouse=True)
@@ -23,21 +24,8 @@ def test_new_file_of_ones_own_runs(capsys: pytest.CaptureFixture[str]) -> None:
     for kind in ("controller", "scene", "task"):
         assert main(["new", kind, f"my_{kind}.py"]) == 0
         assert f"my_{kind}.py" in Path(f"my_{kind}.py").read_text()
-    assert (
-        main(
-            [
-                "run",
-                "planar3-circle",
-                "--controller",
-                "my_controller.py",
-                "--duration",
-                "0.05",
-                "--json",
-                "a.json",
-            ]
-        )
-        == 0
-    )
+    line = "run planar3-circle --controller my_controller.py --duration 0.05 --json a.json"
+    assert main(line.split()) == 0
     assert json.loads(Path("a.json").read_text())["controller"] == "my_controller.py"
     assert main(["run", "my_scene.py", "--duration", "0.05", "--json", "b.json"]) == 0
     assert json.loads(Path("b.json").read_text())["scene"] == "my_scene.py"
@@ -154,7 +142,10 @@ def test_only_regular_files_are_read(capsys: pytest.CaptureFixture[str]) -> None
     assert "fifo.py: cannot be read (not a regular file)" in capsys.readouterr().err
 
 
-def test_sweep_takes_files_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
+def test_sweep_takes_files_of_ones_own(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lessons.parallel.on_cores", one_by_one)
     main(["new", "controller", "mine.py"])
     line = "sweep planar3-circle --controller mine.py --over M_bar_scale=1:2:2 --duration 0.05 --out s"
     assert main(line.split()) == 0

@@ -205,11 +205,7 @@ def test_a_wrong_file_is_a_sentence(
     ids=["leaves", "never ends"],
 )
 def test_a_file_that_would_take_the_program_along_is_a_sentence(
-    kind: str,
-    text: str,
-    words: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    kind: str, text: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from dataclasses import replace
 

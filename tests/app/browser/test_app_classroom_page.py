@@ -12,17 +12,13 @@ from playwright.sync_api import Browser, Page, expect
 from served import served
 
 from app.link.choice import SceneChoice
-from app.link.process import wait_until
 from app.web.server import PageServer, ServerOptions
-from app.web.sessions import STEERING, Classroom
-from browsing.browser_actions import open_page, press, write
 
 pytestmark = [
-    pytest.mark.usefixtures("one_fork_server"),
     pytest.mark.nightly(
         *(f"app/{part}" for part in ("adapter", "classes", "client", "link", "page", "panels/run", "web")),
         "browsing/",
-    ),
+    )
 ]
 
 
@@ -30,26 +26,6 @@ pytestmark = [
 def classroom() -> Iterator[PageServer]:
     with served(classroom=True, class_names=True, max_sessions=4) as running:
         yield running
-
-
-def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
-    """A page without the token shows the same robot and cannot stop it; with the token it can."""
-    assert isinstance(classroom.sessions, Classroom)
-    (learner,) = classroom.sessions.learners
-    page = open_page(browser, classroom.guest_link, 1300, 700)
-    watching = page.get_by_text("you are watching")
-    expect(watching).to_be_visible()
-    press(page, "Pause")
-    expect(page.get_by_text(STEERING).first).to_be_attached()
-    assert learner.status is not None
-    assert learner.status.running
-    write(page, "Instructor's token", "wrong")
-    expect(page.get_by_text("That is not the token.")).to_be_visible()
-    write(page, "Instructor's token", classroom.sessions.token)
-    expect(watching).to_have_count(0)
-    press(page, "Pause")
-    assert wait_until(lambda: learner.status is not None and not learner.status.running, 60)
-    page.context.close()
 
 
 LONG = 120_000  # ms

@@ -19,11 +19,9 @@ from app.panels.inside.plane import TITLE as PLANE
 from app.web.server import PageServer
 from browsing.browser_actions import drag_target, eventually, often, open_page, press, set_number, tab, unfold
 from browsing.scene_switch import show_scene
-from lessons.events import MoveLevel, Set
+from lessons.events import Set
 from lessons.geometry.plane import Plane
 from lessons.scenes.run_spec import RunSpec
-
-pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 INSIDE = pytest.mark.nightly(
     *(f"app/{part}" for part in ("adapter", "html", "link", "page", "panels", "worker")),
@@ -142,39 +140,6 @@ def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer)
     stand_still(sheet, drawing)
     assert plane(drawing).apart < 1e-6
     expect(sheet.get_by_text("Geometry and solver agree to")).to_be_visible()
-
-
-@INSIDE
-def test_swapping_levels_swaps_their_roles(sheet: Page, drawing: PageServer) -> None:
-    learner = learner_of(drawing)
-    before = plane(drawing)
-    assert [level.name for level in before.levels[:2]] == ["reach", "pose"]
-    expect(sheet.get_by_text("1 reach")).to_be_visible()
-    learner.send(Post(MoveLevel("pose", 0)))
-    expect(sheet.get_by_text("1 pose")).to_be_visible()
-    assert eventually(sheet, lambda: plane(drawing).levels[0].name == "pose")
-    stand_still(sheet, drawing)
-    after = plane(drawing)
-    assert before.levels[0].leaves.span.shape == (2, 1)  # the dimension is that of a line
-    assert after.levels[0].leaves.span.shape == (2, 0)  # the dimension is that of a point
-    assert after.apart < 1e-6
-
-
-@INSIDE
-def test_a_torque_bound_cuts(sheet: Page, drawing: PageServer) -> None:
-    learner = learner_of(drawing)
-    assert plane(drawing).box.kinds == (("velocity", "velocity"),) * 2
-    learner.send(Post(Set("limits.torque_scale", 0.01)))
-    assert eventually(sheet, lambda: any("torque" in kinds for kinds in plane(drawing).box.kinds))
-    drag_target(sheet, axis=0, along=0.12, arm=ARM)
-
-    def cut() -> bool:
-        now = plane(drawing)
-        at = now.levels[1].solved
-        return bool((np.minimum(at - now.box.lower, now.box.upper - at) < 1e-7).any()) and now.apart < 1e-6
-
-    assert eventually(sheet, cut)
-    expect(sheet.locator(f'[data-chart="{PLANE}"]').get_by_text("torque", exact=True).first).to_be_visible()
 
 
 @INSIDE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from playwright.sync_api import Browser
 from served import served
 
@@ -14,7 +13,6 @@ ARM = 0.18  # m, the length of an arrow at the target
 HEAD = 60  # px, the height of the panel's head
 
 
-@pytest.mark.usefixtures("one_fork_server")
 def test_the_plots_stand_in_a_row_below_the_robot(browser: Browser) -> None:
     with served("iiwa14-hold", grace=2.0) as server:
         page = open_page(browser, server.link, *SIZE)

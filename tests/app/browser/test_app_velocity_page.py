@@ -34,8 +34,6 @@ from lessons.scenes.names import ALL_SCENES
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 MISSIONS = pytest.mark.nightly(
     *(f"app/{part}" for part in ("adapter", "html", "link", "page", "panels", "view", "worker")),
     *("browsing/", "himpc/htmpc", "himpc/missions", "lessons/scenes", "lessons/session", "lessons/settings"),
@@ -168,36 +166,6 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
     expect(page.get_by_text("MISSION DONE").last).to_be_visible()
     assert np.linalg.norm(latest(learner, "x/base") - goal(learner, 1)) < 0.05
     assert latest(learner, "clearance")[0] > 0.0
-
-
-@MISSIONS
-def test_tasks_are_added_released_and_settings_changed(page: Page, learner: SimulationClient) -> None:
-    load(page, learner, "ridgeback-ur10-handover")
-    assert eventually(page, lambda: is_drawn(page, "/person/1"))
-    tab(page, "Control")
-    set_number(page, "δ [mm]", 25)
-    set_number(page, "N", 6)
-    set_number(page, "R inputs, arm", 0.05)
-
-    def adopted() -> bool:
-        settings = learner.settings
-        return (
-            isinstance(settings, VelocitySettings)
-            and (settings.htmpc.delta_m, settings.htmpc.horizon) == (0.025, 6)
-            and settings.htmpc.input_effort == (0.1, 0.1, 0.1, *(0.05,) * 6)
-        )
-
-    assert eventually(page, adopted)
-    set_number(page, "Speed", 0.5)
-    press(page, "Reset")  # the scene's own script also releases it, after 14 s
-    tab(page, "Tasks")
-    page.get_by_role("button", name="Release ee 1").click()
-    assert eventually(page, lambda: mission(learner).rows[1].state == "done")
-    assert eventually(page, lambda: mission(learner).people[0].balls == 1)
-    unfold(page, "Add a task")
-    press(page, "Add")
-    assert eventually(page, lambda: mission(learner).rows[-1].name == "ee added")
-    assert learner.failure is None
 
 
 @MISSIONS

@@ -20,7 +20,7 @@ CHOICE = SceneChoice(RunSpec("iiwa14-hold"))
 
 
 @pytest.fixture(scope="package")
-def server(one_fork_server: None) -> Iterator[PageServer]:
+def server() -> Iterator[PageServer]:
     with served(CHOICE, max_sessions=2, grace=2.0, own_files=Folder.at(".")) as running:
         yield running
 

@@ -151,8 +151,7 @@ def test_N_and_M_bar_change_while_it_runs(page: Page, learner: SimulationClient)
     settings = learner.settings
     assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 10)
     assert eventually(
-        page,
-        lambda: isinstance(learner.settings, TorqueSettings) and learner.settings.M_bar_scale == 1.5,
+        page, lambda: isinstance(learner.settings, TorqueSettings) and learner.settings.M_bar_scale == 1.5
     )
     assert settings is not None and learner.failure is None
     expect(page.get_by_text("spectral radius")).to_be_visible()

@@ -1,9 +1,10 @@
-"""Contacts on the page: reported, drawn as arrows, and marked in the plot of errors."""
+"""What the 3D view draws of robots, contacts and objects."""
 
 from __future__ import annotations
 
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ import pytest
 from app.link.choice import SceneChoice
 from app.link.messages import ContactPoint, Post
 from app.panels.run.plots import touching
-from app.view.robot import CoverView
+from app.tab.context import PageContext
+from app.view.robot import CoverView, JointTurns
 from app.view.surroundings import ContactView, WorldView
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveTarget
@@ -119,3 +121,46 @@ def test_the_cover_is_drawn_on_request() -> None:
             assert (part.vertices.max(axis=0) >= ends.max(axis=0) + 0.97 * capsule.radius).all()
     view.draw(False)
     assert not any(node.visible for node in scene.added.values())
+
+
+def recording(*rows: tuple[float, float, float]) -> Any:
+    """Returns a window with rows of t, q_1 and q_2."""
+    values = np.array(rows)
+    layout = SimpleNamespace(fields={"t": slice(0, 1), "q": slice(1, 3)})
+    return SimpleNamespace(layout=layout, columns=lambda span: values[:, span])
+
+
+def test_the_turn_since_the_start_is_at_each_joint() -> None:
+    """Also if the page saw no picture of the start, as in a run that is as fast as possible."""
+    scene = MagicMock()
+    labels = scene.add_label.side_effect = [MagicMock(visible=False, text="") for _ in range(2)]
+    turns, q, poses = JointTurns(scene, (1, 2)), np.array([0.5, -1.0]), np.arange(21.0).reshape(3, 7)
+    unknown, nothing = np.full(2, np.nan), recording((np.nan, np.nan, np.nan))
+    turns.draw(0.0, unknown, poses, nothing)
+    turns.draw(3.0, q, poses, recording((2.0, *q), (3.0, *q)))
+    assert not any(label.visible for label in labels), "a page that opens late does not know the start"
+    whole = recording((np.nan, np.nan, np.nan), (0.001, *q), (1.0, 9.0, 9.0))
+    turns.draw(1.0, q + np.radians([12.4, -0.26]), poses, whole)
+    assert [label.text for label in labels] == ["1: 12°", "2: 0.3°"] and labels[1].visible
+    assert labels[1].position == (7.0, 8.0, 9.0)
+    turns.draw(1.0, unknown, poses, whole)
+    assert not labels[0].visible and "nan" not in labels[0].text
+    turns.draw(0.0, q, poses, whole)
+    assert not labels[0].visible, "hidden again after a reset"
+
+
+def test_poses_of_another_scene_are_none_of_this_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The next scene, whose robot has other joints, arrives while the page is still the one of the scene
+    before. This page gets no poses of the new robot."""
+    robot, now = load_robot("iiwa14"), object()
+    recording = SimpleNamespace(block=SimpleNamespace(poses=lambda: np.ones((4, 7))))
+    learner = SimpleNamespace(ready=now, read=lambda look: look(recording))
+    ready = SimpleNamespace(robot=robot)
+    mock = MagicMock()
+    monkeypatch.setattr("app.tab.context.InView", mock)  # it sends a script to the browser
+    made: Any = (mock, learner, ready, {}, mock)
+    page = PageContext(*made)
+    assert page.poses() is None
+    assert page.poses_or_still().shape == (robot.n + 1, 7)
+    learner.ready = ready
+    assert page.poses() is not None
