@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import Fallback
-from himpc.limits.braking import braking, least_slack, missed
+from himpc.limits.rest import braking, least_slack, missed
 from himpc.limits.rows import Rows
 
 Array = NDArray[np.float64]

@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.limits.constraint import Constraint, Directions, Moment
+from himpc.limits.constraint import Constraint, Directions, Moment, Near
 from himpc.limits.constraints import bit_of, imposed
 from himpc.limits.limits import Limits, LimitsInForce
-from himpc.limits.near import Near
 from himpc.limits.position import POSITION
 from himpc.limits.velocity import VELOCITY
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
 
 Array = NDArray[np.float64]
 

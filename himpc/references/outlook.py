@@ -1,12 +1,33 @@
-"""All references at one control tick."""
+"""What a controller knows at one control tick: all references, and the objects around the robot."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import final
+from typing import NamedTuple, final
 
-from himpc.references.observed import NOTHING, Observed
+import numpy as np
+from numpy.typing import NDArray
+
 from himpc.references.preview import Preview, Reference
+from robots.cover_shapes import WorldShape
+
+Array = NDArray[np.float64]
+
+
+class Observed(NamedTuple):
+    """The objects around the robot, as a controller knows them at a tick. The real objects may differ.
+
+    Attributes:
+        shapes: the objects at their present positions.
+        velocity: velocities of the objects' centres, (B, 3) m/s; None: the objects are at rest.
+    """
+
+    shapes: tuple[WorldShape, ...] = ()
+    velocity: Array | None = None
+
+
+NOTHING = Observed()
+"""No known objects."""
 
 
 @final

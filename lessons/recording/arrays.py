@@ -59,7 +59,7 @@ def named(
     - `tau_0`: the torque that acted until the tick; at velocity level, the command;
     - `tip`: the name of the frame; `a_max`: (n,);
     - `position_margin` (rad), `position_reaction` (s), `position_return_rate` (1/s): the constants of
-      `himpc.limits.viability`, NaN if this limit is not in force.
+      `himpc.limits.velocity`, NaN if this limit is not in force.
 
     The values of x_d, v_d and a_d at the next knot are in the next row.
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from himpc.htmpc import HTMPCSettings
 from himpc.htmpc.clearance import CollisionModel
-from himpc.limits.avoidance import Avoidance
-from himpc.references.observed import Observed
+from himpc.limits.limits import Avoidance
+from himpc.references.outlook import Observed
 from himpc.tick.distances import Distances
 from robots import Plant, Robot
 from robots.collision import Ball, Box, Floor, Obstacle

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from himpc.formulation.forms import StackForm, measure, stack_form
 from himpc.kinematics.configuration import Configuration
 from himpc.references import Preview
-from himpc.references.hold import still
+from himpc.references.curves import still
 from lessons.experiments.jobs import Job, JobResult, Results, Work
 from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET, step_seconds
 from lessons.papers.himpc_paper.planar import RT1
