@@ -16,9 +16,9 @@ from typing import Literal
 import daqp
 import numpy as np
 import proxsuite
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.arrays import Array
+
 Solver = Literal["daqp", "proxqp", "qpoases"]
 """The names of the solvers. The paper uses `qpoases`, which is part of CasADi, see `is_installed`."""
 

@@ -240,6 +240,7 @@ def dotted(path: Path) -> str:
 
 
 ROBOTS = {
+    "arrays": (),
     "errors": (),
     "lazy": (),
     "report": (),
@@ -250,25 +251,30 @@ ROBOTS = {
     "settings": ("ranges", "errors"),
     "processes": ("errors",),
     "meshes": ("processes", "report", "errors"),
-    "joints": (),
+    "joints": ("arrays",),
     "urdf": ("meshes", "inertia", "joints", "report", "errors"),
     "mjcf": ("urdf", "meshes", "report", "errors"),
     "geometry": (),
     "robot": ("geometry", "urdf", "joints", "report", "errors"),
     "per_robot": ("robot",),
-    "reach": ("robot",),
+    "reach": (
+        "arrays",
+        "robot",
+    ),
     "truth": ("robot", "joints", "settings"),
-    "nominal": ("truth", "robot", "inertia", "settings", "ranges"),
-    "collision": ("robot", "errors"),
+    "nominal": ("arrays", "truth", "robot", "inertia", "settings", "ranges"),
+    "collision": ("arrays", "robot", "errors"),
     "world": ("collision", "ranges", "errors"),
-    "cover_shapes": ("collision", "per_robot", "robot", "geometry"),
-    "shapes": ("joints", "truth", "per_robot", "robot", "geometry", "meshes"),
+    "cover_shapes": ("arrays", "collision", "per_robot", "robot", "geometry"),
+    "shapes": ("arrays", "joints", "truth", "per_robot", "robot", "geometry", "meshes"),
     "mechanics": (
         *("joints", "world", "collision", "truth", "robot", "geometry", "inertia", "settings", "errors"),
     ),
     "floor": ("mechanics", "world", "collision", "robot"),
-    "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry"),
-    "plant": (*("joints", "mechanics", "world", "truth", "robot", "settings", "signals", "errors"),),
+    "covering": ("arrays", "mechanics", "shapes", "per_robot", "robot", "geometry"),
+    "plant": (
+        *("arrays", "joints", "mechanics", "world", "truth", "robot", "settings", "signals", "errors"),
+    ),
     "servo": ("plant", "robot", "settings", "ranges", "signals"),
     "loading": (
         *(

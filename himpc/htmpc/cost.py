@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.cost import model
 from himpc.htmpc.prediction import Start, integrator
 from himpc.htmpc.rows import ConstraintRows
 from himpc.htmpc.settings import Efforts
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 MU = 1e-3
 """Weight of the barrier (the HTMPC authors' published value)."""

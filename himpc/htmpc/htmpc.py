@@ -9,7 +9,6 @@ from itertools import accumulate
 from time import perf_counter_ns
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import ActiveSetSolver
 from himpc.htmpc.clearance import Avoidance, CollisionModel, clearance
@@ -29,9 +28,7 @@ from himpc.references import Preview
 from himpc.references.curves import still
 from himpc.stack import Stack
 from robots import Robot
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array, Integers
 
 _MEMORY = 200
 """Number of stored plans; it suffices for a delay of 1 s at 200 Hz."""
@@ -94,7 +91,7 @@ class HTMPC:
         """Returns the enabled levels that are solved."""
         return enabled
 
-    def _held(self, chosen: Stack, settings: HTMPCSettings) -> NDArray[np.int64]:
+    def _held(self, chosen: Stack, settings: HTMPCSettings) -> Integers:
         """Returns the columns of the joints that stay at rest."""
         return np.array(joint_indices(self.robot, settings.hold) if settings.hold else [], np.int64)
 

@@ -13,12 +13,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.motion import brake
 from himpc.htmpc.settings import MotionBounds
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 class Integrator(NamedTuple):

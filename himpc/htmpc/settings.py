@@ -7,17 +7,14 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.qp import Solver, is_installed
 from himpc.stack import Stack, Weight, check_names
 from robots import InputError, Robot
+from robots.arrays import Array
 from robots.collision import Obstacle
 from robots.per_robot import per_robot
 from robots.ranges import SCALE, Range, Shown, check_fields
-
-Array = NDArray[np.float64]
-
 
 Formulation = Literal["proximal", "paper"]
 Lexicographic = Literal["per_coordinate", "cost"]

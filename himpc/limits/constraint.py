@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.limits.limits import Limits, LimitsInForce
 from himpc.prediction import JointState
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Mask
 
 
 class Near(NamedTuple):
@@ -83,7 +81,7 @@ class Block(NamedTuple):
     lower: Array
     upper: Array
     directions: Directions | None = None
-    stopping: NDArray[np.bool_] | None = None
+    stopping: Mask | None = None
 
 
 @dataclass(frozen=True, eq=False)

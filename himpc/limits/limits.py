@@ -9,13 +9,10 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots import InputError, Robot
+from robots.arrays import Array
 from robots.ranges import SCALE, Folder, Range, Shown, check_fields
-
-Array = NDArray[np.float64]
-
 
 MOST = 8
 """Largest number of pairs with a row; a robot with fewer joints has as many rows as joints."""

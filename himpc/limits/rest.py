@@ -7,7 +7,6 @@ from operator import is_
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.limits.constraint import Constraint
 from himpc.limits.position import POSITION
@@ -16,8 +15,7 @@ from himpc.limits.torque import TORQUE
 from himpc.limits.torque_rate import TORQUE_RATE
 from himpc.limits.velocity import VELOCITY, summed_twice
 from himpc.qp import solve_qp
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Indices
 
 
 def steps(x: Array) -> Array:
@@ -71,7 +69,7 @@ class _Part(NamedTuple):
     upper: Array
     T: Array
     G: Array
-    ranks: NDArray[np.intp]
+    ranks: Indices
 
 
 def closest_to_rest(rows: Rows, rest: Array) -> Array:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.constants import RETURN_RATE
 from himpc.limits.constraint import Block, Constraint, Moment, lags
 from himpc.limits.limits import Limits
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 def viability_bounds(

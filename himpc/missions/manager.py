@@ -13,16 +13,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from himpc.missions.mission import Follow, Go, Mission, MissionTask, Point, check_mission, find
 from himpc.references import Reference
 from himpc.tasks import Task
 from robots import InputError
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array
 
 _CLOCK = 1e-9
 """Largest rounding error of a sum of control periods, s."""

@@ -9,7 +9,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from himpc.references.preview import Array, Preview, Reference, sampled, times
+from himpc.references.preview import Preview, Reference, sampled, times
+from robots.arrays import Array
 
 
 @dataclass(frozen=True)

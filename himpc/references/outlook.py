@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple, final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.references.preview import Preview, Reference
+from robots.arrays import Array
 from robots.cover_shapes import WorldShape
-
-Array = NDArray[np.float64]
 
 
 class Observed(NamedTuple):

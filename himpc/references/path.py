@@ -8,8 +8,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from himpc.references.preview import Array, Preview, sampled, times
+from himpc.references.preview import Preview, sampled, times
 from robots import InputError
+from robots.arrays import Array
 from robots.errors import unknown_name
 
 

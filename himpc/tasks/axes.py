@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from himpc.references.preview import Preview
-from himpc.tasks.task import Array, Task
+from himpc.tasks.task import Task
 from robots import InputError
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration

@@ -10,20 +10,18 @@ from time import process_time
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from himpc.references.target import POSITION_CAPS
 from lessons.events import MoveTarget
 from lessons.scenes.hold import hold_robot
 from lessons.session.start import begin
 from robots import Robot
+from robots.arrays import Array
 from robots.covering.covers import near
 from robots.errors import listed, shortened
 from robots.loading.home import chain_length
 from robots.plant import Plant
 from robots.reach import ReachJudge
-
-Array = NDArray[np.float64]
 
 SHARE = 0.15
 """Length of the drag as a share of the arm's length."""

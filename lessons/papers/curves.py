@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.experiments.jobs import JobResult
 from lessons.papers.item import Row, Section
 from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import name
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Mask
 
 
 def curve(run: JobResult, field: str, k: int = 0, scale: float = 1.0, **how: object) -> PlotCurve:
@@ -116,7 +114,7 @@ def _largest(curve: PlotCurve) -> PlotCurve:
     return band if band.y_to is None else replace(band, y=band.y_to, y_to=None, style="line")
 
 
-def spans(t: Array, inside: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
+def spans(t: Array, inside: Mask) -> tuple[tuple[float, float], ...]:
     """Returns the intervals of time in which `inside` is true; gaps of less than BAND are closed."""
     times = t[inside]
     if not times.size:

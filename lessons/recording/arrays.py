@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.constants import RETURN_RATE
 from himpc.htmpc.settings import bounds
@@ -20,11 +19,10 @@ from lessons.settings.torque import TorqueSettings
 from lessons.settings.values import finite
 from lessons.settings.velocity import VelocitySettings
 from robots import Robot
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from lessons.recording.run import Recording
-
-Array = NDArray[np.float64]
 
 
 _PER_JOINT = (

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.formulation.forms import StackForm, measure, stack_form
 from himpc.kinematics.configuration import Configuration
@@ -23,9 +22,7 @@ from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.scenes.run_spec import RunSpec
 from robots import Plant
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array
 
 _LOST = 0.5
 """m or rad: an error above this counts as loss of control."""

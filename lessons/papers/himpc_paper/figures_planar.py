@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.curves import (
@@ -26,8 +25,8 @@ from lessons.papers.words import number, stated, trouble, unprinted
 from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import name
 from robots import Robot, load_robot
+from robots.arrays import Array
 
-Array = NDArray[np.float64]
 DEG = 180 / np.pi
 INCREMENTAL = ("tdeosf", "hiqp", "himpc")
 CONFLICT = (rt2("hqp"), rt2("himpc"))

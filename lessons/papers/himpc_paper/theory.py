@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from lessons.experiments.jobs import Job, JobResult, Results
@@ -17,9 +16,7 @@ from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.scenes.run_spec import RunSpec
 from robots import NominalModel
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array
 
 # ---------------------------------------- section III-B: the errors of the models
 

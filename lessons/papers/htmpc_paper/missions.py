@@ -7,7 +7,6 @@ import math
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE
@@ -15,9 +14,7 @@ from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, 
 from lessons.papers.words import number, printed, trouble
 from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array
 
 # ---------------------------------------- Fig. 8: two waypoints
 

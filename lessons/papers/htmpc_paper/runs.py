@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, JobResult
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.missions import random_peaks
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 SOURCE = "HTMPC paper, section V"
 SQUARE = "ridgeback-ur10-square"
