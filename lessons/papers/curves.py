@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from lessons.experiments.jobs import JobResult
-from lessons.papers.item import Row, Section
-from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
+from lessons.plots.panels import Panel, PlotCurve
 from lessons.plots.style import name
 from robots.arrays import Array, Mask
 
@@ -17,13 +16,6 @@ from robots.arrays import Array, Mask
 def curve(run: JobResult, field: str, k: int = 0, scale: float = 1.0, **how: object) -> PlotCurve:
     """Returns the curve of a field of a run over time; nothing is drawn for a run that failed."""
     return PlotCurve(run.t, scale * run.column(field, k), **how)  # pyright: ignore[reportArgumentType]
-
-
-def drawn(
-    name: str, caption: str, panels: Sequence[Panel | Bars], columns: int = 1, rows: tuple[Row, ...] = ()
-) -> Section:
-    """Returns a section with one picture."""
-    return Section(rows=rows, pictures=(Picture(name, caption, tuple(panels), columns),))
 
 
 _BROAD = (2.4, 1.0)

@@ -16,7 +16,8 @@ from himpc.references.curves import still
 from lessons.experiments.jobs import Job, JobResult, Results, Work
 from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET, step_seconds
 from lessons.papers.himpc_paper.planar import RT1
-from lessons.papers.item import Item, PaperCheck, Section, Table
+from lessons.papers.item import PaperCheck, Section, Table
+from lessons.papers.texts import described
 from lessons.papers.words import number, stated, trouble
 from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.catalog import prepared, torque_scene
@@ -350,12 +351,4 @@ def _section(results: Results, quick: bool) -> Section:
     )
 
 
-ITEMS = (
-    Item(
-        "himpc-ablations",
-        "What the text argues without numbers",
-        "HIMPC (T-RO 2024), Remarks 5, 6, 8 and section IV-C",
-        _jobs,
-        _section,
-    ),
-)
+ITEMS = (described("himpc-ablations", _jobs, _section),)

@@ -11,7 +11,6 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.settings.missions import random_peaks
 from robots.arrays import Array
 
-SOURCE = "HTMPC paper, section V"
 SQUARE = "ridgeback-ur10-square"
 PEAKS_SEED = 0
 EE_HOME = np.array([1.490, 0.174])
