@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from himpc.tasks.centre_of_mass import CentreOfMass
+from himpc.tasks.frame_orientation import FrameOrientation
+from himpc.tasks.frame_position import FramePosition
 from himpc.tasks.joints import Damping, Joints, Posture
-from himpc.tasks.orientation import FrameOrientation
+from himpc.tasks.plane_distance import PlaneDistance
 from himpc.tasks.pointing import Pointing
-from himpc.tasks.position import CentreOfMass, FramePosition, PlaneDistance
 from himpc.tasks.relative import RelativeOrientation, RelativePosition
 from himpc.tasks.task import Task
 

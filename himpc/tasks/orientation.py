@@ -1,25 +1,23 @@
-"""Tasks for orientations: the orientation error on one, two or three axes, and a frame's orientation in the
-world."""
+"""The base class of orientation tasks: the orientation error on one, two or three axes."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from himpc.references.preview import Preview
 from himpc.rotation import exp3, log3
-from himpc.tasks.axes import AXES, FrameTask, OnAxes
+from himpc.tasks.axes import AXES, OnAxes
 from himpc.tasks.seen import NUDGE, at_rest, rests, seen
 from himpc.tasks.task import Gain
 from robots.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration
-
 
 _UPRIGHT = 1e-12
 """Sine of an angle. A direction within this angle counts as equal to the desired direction, or to its
@@ -133,20 +131,3 @@ def left_inverse(w: Array) -> Array:
     x, y, z = w
     across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
     return even * np.eye(3) + bent * np.outer(w, w) - 0.5 * across
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrameOrientation(OrientationTask, FrameTask):
-    """x̃ = log₃(R R_dᵀ) in world axes, ẋ = ω (level 2 of Table IV); on fewer axes see `OrientationTask`."""
-
-    first_row: ClassVar[int] = 3
-    unit: ClassVar[Literal["m", "rad"]] = "rad"
-
-    def value(self, configuration: Configuration) -> Array:
-        return configuration.placement(self.frame).rotation
-
-    def rotations(self, configuration: Configuration) -> list[Array]:
-        return [placement.rotation for placement in configuration.placements(self.frame)]
-
-    def angular_jacobian(self, configuration: Configuration) -> Array:
-        return configuration.frame_jacobians(self.frame)[:, 3:]

@@ -1,4 +1,4 @@
-"""Tasks for positions in the world: a frame's origin, the centre of mass, and the distance from a plane."""
+"""A task for the distance of a frame from a plane, such as a table or a wall."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from himpc.tasks.axes import AXES, FrameTask, OnAxes
 from himpc.tasks.task import Task
 from robots import InputError
 from robots.arrays import Array
@@ -15,47 +14,6 @@ from robots.arrays import Array
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration
     from robots import Robot
-
-
-@dataclass(frozen=True, kw_only=True)
-class FramePosition(FrameTask):
-    """x = position of the frame's origin along the chosen world axes, in metres (level 1 of Table IV)."""
-
-    first_row: ClassVar[int] = 0
-    unit: ClassVar[Literal["m", "rad"]] = "m"
-
-    def value(self, configuration: Configuration) -> Array:
-        return configuration.placement(self.frame).translation[self.components]
-
-    def error(self, value: Array, desired: Array) -> Array:
-        return value - desired
-
-
-@dataclass(frozen=True, kw_only=True)
-class CentreOfMass(OnAxes):
-    """x = centre of mass of all moving links, along the chosen world axes, m (Pink and Mink: ComTask).
-
-    Links that are fixed to the world do not count, such as Baxter's torso and head of 36.3 kg. With a fixed
-    mass m_fixed and a moving mass m, the centre of all masses moves m/(m + m_fixed) times as far as the
-    centre of the moving mass. No other task uses masses. The masses are those of the robot's description and
-    do not include a payload.
-
-    Attributes:
-        axes: world axes that are controlled, any non-empty subset of "xyz".
-    """
-
-    axes: str = AXES
-
-    unit: ClassVar[Literal["m", "rad"]] = "m"
-
-    def value(self, configuration: Configuration) -> Array:
-        return configuration.centre_of_mass()[self.components]
-
-    def error(self, value: Array, desired: Array) -> Array:
-        return value - desired
-
-    def jacobian(self, configuration: Configuration) -> Array:
-        return configuration.centre_of_mass_jacobians()[:, self.components]
 
 
 @dataclass(frozen=True, kw_only=True)
