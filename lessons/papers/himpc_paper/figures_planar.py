@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 
+from lessons.experiments.drag import skeleton
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.curves import (
     PLANAR_ERRORS,
@@ -24,7 +24,7 @@ from lessons.papers.texts import described, drawn
 from lessons.papers.words import number, stated, trouble, unprinted
 from lessons.plots.panels import Bars, Panel, PlotCurve
 from lessons.plots.style import name
-from robots import Robot, load_robot
+from robots import load_robot
 from robots.arrays import Array
 
 DEG = 180 / np.pi
@@ -234,14 +234,6 @@ def _fig_13(results: Results, quick: bool) -> Section:
 # ------------------------------------------------------------------------ Figs. 14 and 15: singularity
 
 POSES = 19
-
-
-def skeleton(robot: Robot, q: Array) -> Array:
-    """Joint origins and tip in the world, (n + 1, 3) m."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    joints = [data.oMi[joint].translation for joint in range(1, robot.model.njoints)]
-    return np.array([*joints, data.oMf[robot.frame_id(robot.tip)].translation])
 
 
 def _time_beside(tip: Array, path: Array, t: float) -> tuple[float, float, str]:
