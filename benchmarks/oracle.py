@@ -30,8 +30,8 @@ from himpc import HIMPC
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.controllers.printed_tick import solve
 from himpc.limits import Rows, build_rows
-from himpc.limits.braking import least_slack
-from himpc.prediction.joint import JointState
+from himpc.limits.rest import least_slack
+from himpc.prediction import JointState
 from himpc.references import Outlook
 from himpc.tasks import KINDS
 from himpc.tick.problems import solve_problems

@@ -30,22 +30,4 @@ __all__ = [
     "Stack",
 ]
 
-__getattr__ = lazily(
-    "himpc",
-    {
-        "CONTROLLERS": "catalog",
-        "HIMPC": "controllers",
-        "HTMPC": "htmpc",
-        "Damping": "tasks",
-        "FrameOrientation": "tasks",
-        "FramePosition": "tasks",
-        "HTMPCSettings": "htmpc",
-        "Joints": "tasks",
-        "Level": "stack",
-        "Limits": "limits",
-        "Plan": "plan",
-        "Posture": "tasks",
-        "Settings": "controllers",
-        "Stack": "stack",
-    },
-)
+__getattr__ = lazily("himpc")

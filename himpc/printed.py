@@ -13,13 +13,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
 from himpc.constants import RANK_TOLERANCE
 from himpc.qp import QPSolution, Solver, kkt_residual, solve_qp
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 _NOISE = 1e-11
 """If the part of a row along the free directions is below this share of the row, it is a rounding error."""

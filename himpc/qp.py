@@ -11,14 +11,14 @@ from importlib import import_module
 from importlib.util import find_spec
 from io import StringIO
 from time import perf_counter_ns
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import daqp
 import numpy as np
 import proxsuite
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.arrays import Array
+
 Solver = Literal["daqp", "proxqp", "qpoases"]
 """The names of the solvers. The paper uses `qpoases`, which is part of CasADi, see `is_installed`."""
 
@@ -75,15 +75,25 @@ def solve_qp(
         The solver's point and its KKT residual. The residual is computed here; the solver's status is not
         used.
     """
-    left = _Iterations(iterations)
+    qp, left = _QP(H, f, A, lower, upper), _Iterations(iterations)
     attempts = _ATTEMPTS[solver]
-    solution = _attempt(attempts[0], H, f, A, lower, upper, left)
+    solution = _attempt(attempts[0], qp, left)
     for attempt in attempts[1:]:
         if solution.solved or left.none:
             break
-        again = _attempt(attempt, H, f, A, lower, upper, left)
+        again = _attempt(attempt, qp, left)
         solution = replace(again, time_us=solution.time_us + again.time_us)
     return solution
+
+
+class _QP(NamedTuple):
+    """The arguments of `solve_qp`."""
+
+    H: Array
+    f: Array
+    A: Array
+    lower: Array
+    upper: Array
 
 
 class _Iterations:
@@ -105,33 +115,17 @@ class _Iterations:
             self._left -= used
 
 
-def _attempt(
-    attempt: Callable[..., tuple[Array, Array, str]],
-    H: Array,
-    f: Array,
-    A: Array,
-    lower: Array,
-    upper: Array,
-    left: _Iterations,
-) -> QPSolution:
+def _attempt(attempt: Callable[..., tuple[Array, Array, str]], qp: _QP, left: _Iterations) -> QPSolution:
     started = perf_counter_ns()
-    x, multipliers, status = attempt(H, f, A, lower, upper, left)
+    x, multipliers, status = attempt(qp, left)
     time_us = (perf_counter_ns() - started) / 1e3
     with np.errstate(all="ignore"):  # after an interruption the point may be arbitrary
-        residual = kkt_residual(H, f, A, lower, upper, x, multipliers)
+        residual = kkt_residual(*qp, x, multipliers)
     return QPSolution(x, multipliers, residual, status, time_us)
 
 
-def _daqp(
-    H: Array,
-    f: Array,
-    A: Array,
-    lower: Array,
-    upper: Array,
-    left: _Iterations,
-    scaled: bool = True,
-    **options: float,
-) -> tuple[Array, Array, str]:
+def _daqp(qp: _QP, left: _Iterations, scaled: bool = True, **options: float) -> tuple[Array, Array, str]:
+    H, f, A, lower, upper = qp
     if scaled:
         # DAQP treats rows that are small relative to √H as zero and ignores them without a message. H is
         # therefore scaled to size one and rows to length one. Rows that are rounding errors must not be
@@ -167,9 +161,8 @@ _DAQP = (
 Proximal steps or another scaling then find the optimum."""
 
 
-def _proxqp(
-    H: Array, f: Array, A: Array, lower: Array, upper: Array, _: _Iterations
-) -> tuple[Array, Array, str]:
+def _proxqp(problem: _QP, _: _Iterations) -> tuple[Array, Array, str]:
+    H, f, A, lower, upper = problem
     equal = lower == upper
     free = ~equal
     qp = proxsuite.proxqp.dense.QP(f.size, int(equal.sum()), int(free.sum()))
@@ -183,9 +176,8 @@ def _proxqp(
     return qp.results.x, multipliers, "optimal" if status == "PROXQP_SOLVED" else status.lower()
 
 
-def _qpoases(
-    H: Array, f: Array, A: Array, lower: Array, upper: Array, _: _Iterations
-) -> tuple[Array, Array, str]:
+def _qpoases(problem: _QP, _: _Iterations) -> tuple[Array, Array, str]:
+    H, f, A, lower, upper = problem
     casadi = import_module("casadi")
     shapes = {"h": casadi.Sparsity.dense(*H.shape), "a": casadi.Sparsity.dense(*A.shape)}
     options = {"printLevel": "none", "error_on_fail": False, "print_time": False}

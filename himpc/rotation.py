@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.arrays import Array
+
 _ORIGIN = np.zeros(3)
 
 

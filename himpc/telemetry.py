@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.cascade.level import FALLBACKS
 from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from himpc.kinematics.configuration import Configuration
 from himpc.stack import DAMPING_LEVEL, Stack
 from robots import Robot
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 __all__ = [
     "AT_ACCELERATION",

@@ -33,23 +33,4 @@ __all__ = [
     "with_tasks",
 ]
 
-__getattr__ = lazily(
-    "lessons",
-    {
-        "Job": "experiments.jobs",
-        "Recording": "recording.recording",
-        "RunSpec": "scenes.run_spec",
-        "arrays": "recording.arrays",
-        "begin": "session.start",
-        "chosen": "experiments.tune",
-        "load_scene": "scenes.catalog",
-        "perform_all": "experiments.jobs",
-        "prepared": "scenes.catalog",
-        "run": "recording.run",
-        "scene_named": "runs.named",
-        "summary": "recording.summary",
-        "torque_scene": "scenes.catalog",
-        "tune": "experiments.tune",
-        "with_tasks": "runs.named",
-    },
-)
+__getattr__ = lazily("lessons")

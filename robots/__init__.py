@@ -43,30 +43,4 @@ __all__ = [
     "tracking_bandwidth",
 ]
 
-__getattr__ = lazily(
-    "robots",
-    {
-        "CATALOG": "catalog",
-        "Ball": "collision",
-        "Box": "collision",
-        "Finding": "report",
-        "Floor": "collision",
-        "ImportReport": "report",
-        "InputError": "errors",
-        "NominalModel": "nominal",
-        "NominalSettings": "nominal",
-        "Plant": "plant",
-        "PlantSettings": "settings",
-        "PlantState": "signals",
-        "Robot": "robot",
-        "VelocityPlant": "servo",
-        "VelocityPlantSettings": "servo",
-        "check_urdf": "loading.load",
-        "convergence_eigenvalues": "inertia",
-        "convergence_gauge": "inertia",
-        "load_robot": "loading.load",
-        "load_urdf_text": "loading.load",
-        "suggest_M_bar": "inertia",
-        "tracking_bandwidth": "inertia",
-    },
-)
+__getattr__ = lazily("robots")

@@ -9,13 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from robots.arrays import Array, Indices, Mask
 from robots.errors import InputError
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Point = tuple[float, float, float]
 FLOOR, BALL, BOX, CAPSULE = range(4)
 """Kinds of shapes."""
@@ -110,7 +108,7 @@ class Surroundings(NamedTuple):
     middle: Array
     half: Array
     thickness: Array
-    meets: NDArray[np.bool_]
+    meets: Mask
 
 
 class ShapeArrays(NamedTuple):
@@ -186,7 +184,7 @@ def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: 
     )
 
 
-def _own_base(own: NDArray[np.bool_], centre: Array, radius: Array) -> Box:
+def _own_base(own: Mask, centre: Array, radius: Array) -> Box:
     """Returns a box around the base's own spheres, in the axes of the base."""
     low = (centre[own] - 0.6 * radius[own, None]).min(axis=0)
     high = (centre[own] + 0.6 * radius[own, None]).max(axis=0)

@@ -8,14 +8,12 @@ from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from robots.arrays import Array, Mask
 from robots.collision import CAPSULE, Floor, Surroundings, WorldShape, base_joint, shape_arrays
 from robots.geometry import Capsule, Cover
 from robots.per_robot import per_robot
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 _POSTURES = 24
 _STILL = 1e-3
@@ -72,7 +70,7 @@ def placements(shapes: Sequence[WorldShape]) -> tuple[Array, Array]:
 
 
 @per_robot
-def _reaches(robot: Robot, capsules: tuple[Capsule, ...], height: float) -> NDArray[np.bool_]:
+def _reaches(robot: Robot, capsules: tuple[Capsule, ...], height: float) -> Mask:
     """Returns whether the height of each capsule above a floor depends on the posture and is positive at
     home, (S,)."""
     rng = np.random.default_rng(0)

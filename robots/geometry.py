@@ -83,9 +83,7 @@ class CollisionModel:
         }
         counts = Counter(solid.source for solid in self.solids)
         parts = [text.format(counts[source]) for source, text in words.items() if counts[source]]
-        near = sum(pair.why == "neighbours" for pair in self.excluded)
-        text = f"contacts use {', '.join(parts)}; left out are {near} pair(s) of neighbours"
-        return text + excluded_pairs(self.excluded)
+        return f"contacts use {', '.join(parts)}; {_left_out(self.excluded)}"
 
 
 _SHOWN = 8
@@ -97,9 +95,10 @@ _TOLD = (
 )
 
 
-def excluded_pairs(excluded: tuple[Excluded, ...]) -> str:
-    """Returns the end of a sentence of the import report: the pairs that are left out, except neighbours."""
-    text = ""
+def _left_out(excluded: tuple[Excluded, ...]) -> str:
+    """Returns the end of a sentence of the import report: the pairs that are left out."""
+    near = sum(pair.why == "neighbours" for pair in excluded)
+    text = f"left out are {near} pair(s) of neighbours"
     for why, said in _TOLD:
         pairs = [" – ".join(pair.names) for pair in excluded if pair.why == why]
         shown = ", ".join(pairs[:_SHOWN]) + (f" and {len(pairs) - _SHOWN} more" if pairs[_SHOWN:] else "")
@@ -137,9 +136,8 @@ class Cover:
         """Returns one line for the import report."""
         if not self.capsules:
             return "the robot has no capsules: no distance is kept"
-        near = sum(pair.why == "neighbours" for pair in self.excluded)
         text = f"distances use {len(self.capsules)} capsules that contain the links"
-        return f"{text}; left out are {near} pair(s) of neighbours{excluded_pairs(self.excluded)}"
+        return f"{text}; {_left_out(self.excluded)}"
 
 
 Geometry = TypeVar("Geometry", CollisionModel, Cover)

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.arrays import Array, Indices
 
 
 def own_joints(model: pin.Model) -> tuple[int, ...]:
@@ -29,7 +28,7 @@ def joint_axis(model: pin.Model, joint: int) -> tuple[bool, Array]:
     return prismatic, motion if length == 1.0 else motion / length
 
 
-def motions(model: pin.Model) -> tuple[NDArray[np.intp], Array]:
+def motions(model: pin.Model) -> tuple[Indices, Array]:
     """Returns for each joint, (J,), the index of the coordinate that moves it, and the motion along its axis
     per motion of the coordinate: 1 for a joint with a coordinate of its own, > 0. The world has 0 and 1."""
     column, factor = np.zeros(model.njoints, np.intp), np.ones(model.njoints)

@@ -7,15 +7,14 @@ from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from robots.arrays import Array
 from robots.inertia import mass_matrix
 from robots.ranges import Range, Shown, check_fields
 from robots.robot import Robot
 from robots.settings import PerJoint, PlantSettings, per_joint
 from robots.truth import true_model
 
-Array = NDArray[np.float64]
 _BELIEVED = "Value in the nominal model, which model-based controllers use"
 
 

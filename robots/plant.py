@@ -13,8 +13,8 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.arrays import Array
 from robots.errors import InputError
 from robots.joints import coupling
 from robots.mechanics.contacts import Contact, Touch, contacts, touch_of
@@ -24,9 +24,6 @@ from robots.settings import PlantSettings
 from robots.signals import Encoders, Motors, PlantState, as_vector
 from robots.truth import encoder_resolution
 from robots.world import World, check_world
-
-Array = NDArray[np.float64]
-
 
 _ZERO = (0.0, 0.0, 0.0)
 _BROKEN = 1e6  # rad/s or m/s

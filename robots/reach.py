@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from robots.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 POSITION_TOLERANCE = 2e-3  # m
 ROTATION_TOLERANCE = np.radians(1.0)  # rad

@@ -3,7 +3,7 @@ control."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -119,12 +119,6 @@ class Robot:
                 setattr(model, name, values)
             state = {**state, "model": model}
         self.__dict__.update(state)
-
-    def with_tip(self, tip: str) -> Robot:
-        """Returns the same robot with another default end-effector frame. Raises InputError for an unknown
-        frame."""
-        self.frame_id(tip)
-        return replace(self, tip=tip, report=replace(self.report, tip=tip))
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n={self.n}, tip={self.tip!r})"

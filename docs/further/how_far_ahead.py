@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from docs.further.kit import Further, Line, Question
-from himpc.prediction.task import residual_model
+from himpc.prediction import residual_model
 
 
 def effects(N: int, K_p: float = 100.0, K_v: float = 20.0) -> np.ndarray:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from docs.further.kit import Further, Line, Question, measured, null_space, planar
-from himpc.limits.avoidance import Avoidance
+from himpc.limits.constraint import Near
 from himpc.limits.distance import least_rates
-from himpc.limits.near import Near
+from himpc.limits.limits import Avoidance
 from himpc.qp import solve_qp
 
 A, T = Avoidance().deceleration, Avoidance().reaction

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from docs.further.kit import Further, Line, Question
-from himpc.prediction.task import residual_model
+from himpc.prediction import residual_model
 
 HOME: float = brentq(lambda t: (1 + 10 * t) * math.exp(-10 * t) - 0.05, 0.0, 5.0)  # pyright: ignore[reportAssignmentType]
 PERIOD = 2 * math.pi / math.sqrt(100 - 1)

@@ -9,8 +9,7 @@ import numpy as np
 from docs.further.kit import Further, Line, Question
 from himpc.limits import Limits
 from himpc.limits.limits import POSITION_MARGIN
-from himpc.limits.velocity import REACTION
-from himpc.limits.viability import viability_bounds
+from himpc.limits.velocity import REACTION, viability_bounds
 
 T_S = 1e-3
 A = 20.0

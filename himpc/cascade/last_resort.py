@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.cascade.level import Fallback
-from himpc.limits.braking import braking, least_slack, missed
+from himpc.limits.rest import braking, least_slack, missed
 from himpc.limits.rows import Rows
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 ROOM = 1e-7
 """N·m added to the least slack, so that the widened rows have an interior in spite of rounding."""

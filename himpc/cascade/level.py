@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.limits.rows import Rows
+from robots.arrays import Array, Indices
 
-Array = NDArray[np.float64]
 Fallback = Literal["solve", "soften", "feasible", "previous", "inherit", "brake", "hold"]
 FALLBACKS: tuple[Fallback, ...] = get_args(Fallback)
 
@@ -70,8 +69,8 @@ class ActiveRows:
     (34a) decreases by twice the multiplier.
     """
 
-    row: NDArray[np.intp]
-    joint: NDArray[np.intp]
+    row: Indices
+    joint: Indices
     multiplier: Array
     slack: Array
 

@@ -41,10 +41,10 @@ def compile_apart(module: str, tell: Callable[[str], None]) -> None:
 def started(module: str, out: int, only_needed: bool = False) -> subprocess.Popen[str]:
     """Returns a process that compiles and writes the dotted names of compiled functions to the file `out`. It
     ends when this process ends or closes its pipe. only_needed: only the functions that the module needs are
-    compiled, see `compiler_process`."""
+    compiled, see `compiling.serve`."""
     code = (
         f"import sys; sys.path[:] = {sys.path!r}; "
-        f"from himpc.compilation.compiler_process import serve; serve({module!r}, {only_needed!r})"
+        f"from himpc.compilation.compiling import serve; serve({module!r}, {only_needed!r})"
     )
     return subprocess.Popen(
         (sys.executable, "-c", code),

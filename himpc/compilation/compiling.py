@@ -1,17 +1,21 @@
-"""Compiles all functions, and reports the progress."""
+"""Compiles all functions, and reports the progress; the program of the process that compiles."""
 
 from __future__ import annotations
 
 import ast
+import os
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+
+from himpc.compilation.compiler import started
+from robots.processes.orphans import end_with
 
 _DOOR = "himpc.compilation.compiled"
 _PACKAGE = Path(__file__).parents[1]
 LARGEST = "himpc.tick.kernel.control_period"
 """The module with the function whose compilation takes as long as that of all others. It is loaded after
-them: another process may compile it meanwhile, see `compiler_process`."""
+them: another process may compile it meanwhile, see `serve`."""
 
 
 def compile_all(tell: Callable[[int, int], None]) -> None:
@@ -36,6 +40,28 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
         for module in sorted(waiting, key=lambda name: name == LARGEST or ".export." in name):
             import_module(module)
             ready |= waiting[module]
+
+
+def serve(module: str, only_needed: bool = False) -> None:
+    """The program of a process that `compiler.started` starts. It compiles, and reports every compiled
+    function on standard output: for a module of this package all functions of the package, where a second
+    process compiles the largest one; with `only_needed`, or for another module, only those that the module
+    needs."""
+    from himpc.compilation.compiled import on_compiled
+
+    end_with(0)
+    # A module may print text, which must not be mixed with the reports.
+    with os.fdopen(os.dup(1), "w", buffering=1) as out:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        with on_compiled(lambda name: print(name, file=out)):
+            if only_needed or not module.startswith("himpc."):
+                import_module(module)
+                return
+            with started(LARGEST, out.fileno(), only_needed=True) as largest:
+                try:
+                    compile_all(lambda *_: None)
+                finally:
+                    largest.kill()  # its code is on disk, or could not be stored
 
 
 def compiled_functions() -> dict[str, frozenset[str]]:

@@ -1,5 +1,10 @@
 """Loads compiled functions from disk when their module is first imported. Functions that are not on disk are
-first compiled in a separate process, see `compiler`."""
+first compiled in a separate process, see `compiler`.
+
+When a function is requested, Numba first prepares its compiler: it reads Numba's definitions of NumPy's
+functions, and imports SciPy. This preparation takes a third of a second in every process. It is not needed if
+the machine code is on disk.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +18,30 @@ from typing import Any
 import numpy.ma  # noqa: F401  (Numba imports it at the first call with an array, which would be a robot's first tick)
 from numba import njit
 from numba.core import event
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime.nrt import rtsys
 
+from himpc.compilation import OPTIONS, Function
 from himpc.compilation.compiler import compile_apart, compiles_here
 from himpc.compilation.keeping import Kept
-from himpc.compilation.loading import load
-from himpc.compilation.options import OPTIONS, Function
 from himpc.compilation.pieces import LinkedCompiler, Open, Piece
 from himpc.compilation.sources import digest_of
+
+
+def load(function: Any, arguments: tuple[Any, ...]) -> bool:
+    """Loads the machine code of a function for arguments of these types, and returns whether it was on
+    disk."""
+    with global_compiler_lock:
+        rtsys.initialize(function.targetctx)  # functions that the machine code calls
+        overload = function._cache.load_overload(arguments, function.targetctx)
+        if overload is None:
+            return False
+        function._cache_hits[arguments] += 1
+        function.targetctx.insert_user_function(overload.entry_point, overload.fndesc, [overload.library])
+        function.add_overload(overload)
+        return True
+
 
 try:
     import fcntl

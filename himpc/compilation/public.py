@@ -10,8 +10,7 @@ from typing import Any
 import numba
 from numba import njit
 
-from himpc.compilation import SWITCH
-from himpc.compilation.options import OPTIONS, Function
+from himpc.compilation import OPTIONS, SWITCH, Function
 from himpc.compilation.sources import digest_of
 from robots.errors import InputError
 

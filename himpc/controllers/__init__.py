@@ -33,19 +33,4 @@ __all__ = [
     "make_controller",
 ]
 
-__getattr__ = lazily(
-    "himpc.controllers",
-    {
-        "Controller": "controller",
-        "HIMPC": "himpc",
-        "HIQP": "hiqp",
-        "HQP": "hqp",
-        "NHIMPC": "nhimpc",
-        "OSF": "osf",
-        "Settings": ".formulation.settings",
-        "TDEOSF": "tdeosf",
-        "Weighted": "weighted",
-        "dragged_target": ".tick.target",
-        "make_controller": "make",
-    },
-)
+__getattr__ = lazily("himpc.controllers")

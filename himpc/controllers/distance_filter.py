@@ -12,9 +12,9 @@ from himpc.formulation.settings import Settings
 from himpc.limits import TORQUE, LimitsInForce, Rows
 from himpc.limits.constraint import Moment
 from himpc.limits.distance import DISTANCE
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
 from himpc.qp import solve_qp
-from himpc.references.observed import Observed
+from himpc.references.outlook import Observed
 from himpc.tick.distances import Distances
 from robots import Robot
 

@@ -18,7 +18,7 @@ from himpc.formulation.forms import LevelForm, Prepared, prepare, usable
 from himpc.formulation.settings import Settings, check_solver
 from himpc.limits import LimitsInForce, build_rows, in_force, ramp
 from himpc.plan import Evidence, Plan
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
 from himpc.references import Preview
 from himpc.stack import DAMPING_LEVEL, about
 from himpc.tick.tables import LevelTable

@@ -13,13 +13,12 @@ from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import POSITION, TORQUE, VELOCITY, LimitsInForce, viability_bounds
-from himpc.limits.constraint import Moment
+from himpc.limits.constraint import Moment, Near
 from himpc.limits.constraints import imposed
-from himpc.limits.near import Near
 from himpc.limits.velocity import reaction
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
 from himpc.references import Preview
-from himpc.references.hold import still
+from himpc.references.curves import still
 from himpc.references.outlook import observed_by
 from himpc.tasks import Damping
 from himpc.tick.distances import Distances

@@ -53,7 +53,7 @@ from himpc.formulation.forms import StackForm, prepare, stack_form
 from himpc.formulation.settings import Settings
 from himpc.limits import in_force
 from himpc.references import Reference, Target
-from himpc.references.observed import NOTHING, Observed
+from himpc.references.outlook import NOTHING, Observed
 from himpc.stack import DAMPING_LEVEL, freedom_left
 from himpc.tasks import Damping, Task
 from himpc.tick.configure import Span, arena_for, write_curve, write_limits

@@ -11,13 +11,11 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.export.image import Image
 from himpc.export.objects import object_code, target_named
+from robots.arrays import Array
 from robots.errors import InputError
-
-Array = NDArray[np.float64]
 
 _ALIGNMENT = 64
 

@@ -14,9 +14,9 @@ from himpc.cascade.level import LevelProblem
 from himpc.constants import TURN_PULL
 from himpc.formulation.settings import Settings
 from himpc.kinematics.configuration import Configuration
-from himpc.prediction.task import ResidualModel, residual_model
+from himpc.prediction import ResidualModel, residual_model
 from himpc.references import Later, Preview
-from himpc.references.hold import still
+from himpc.references.curves import still
 from himpc.stack import DAMPING_LEVEL, Level, active_levels, freedom_left
 from himpc.tasks import Damping, FramePosition, Task
 from robots import InputError, Robot

@@ -6,13 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.cascade.level import LevelSolution
 from himpc.formulation.forms import StackForm
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 class Memory(NamedTuple):

@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 from robots.lazy import lazily
 
 if TYPE_CHECKING:
-    from himpc.htmpc.base import G, base_joints
     from himpc.htmpc.htidkc import HTIDKC
-    from himpc.htmpc.htmpc import HTMPC
+    from himpc.htmpc.htmpc import HTMPC, HTMPC_WPT, STMPC
     from himpc.htmpc.placo_control import Placo
     from himpc.htmpc.plan import LevelEvidence, VelocityPlan
     from himpc.htmpc.settings import (
@@ -16,9 +15,9 @@ if TYPE_CHECKING:
         HTMPCSettings,
         MotionBounds,
         MotionLimits,
+        base_joints,
         bounds,
     )
-    from himpc.htmpc.stmpc import HTMPC_WPT, STMPC
 
 __all__ = [
     "FORMULATIONS",
@@ -27,7 +26,6 @@ __all__ = [
     "HTMPC_WPT",
     "LEXICOGRAPHIC",
     "STMPC",
-    "G",
     "HTMPCSettings",
     "LevelEvidence",
     "MotionBounds",
@@ -38,23 +36,4 @@ __all__ = [
     "bounds",
 ]
 
-__getattr__ = lazily(
-    "himpc.htmpc",
-    {
-        "FORMULATIONS": "settings",
-        "HTIDKC": "htidkc",
-        "HTMPC": "htmpc",
-        "HTMPC_WPT": "stmpc",
-        "LEXICOGRAPHIC": "settings",
-        "STMPC": "stmpc",
-        "MotionBounds": "settings",
-        "G": "base",
-        "HTMPCSettings": "settings",
-        "LevelEvidence": "plan",
-        "MotionLimits": "settings",
-        "Placo": "placo_control",
-        "VelocityPlan": "plan",
-        "base_joints": "base",
-        "bounds": "settings",
-    },
-)
+__getattr__ = lazily("himpc.htmpc")

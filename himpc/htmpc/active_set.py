@@ -12,13 +12,11 @@ from __future__ import annotations
 from time import perf_counter_ns
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.active_set import VECTORS, factor, solve
 from himpc.htmpc.rows import ConstraintRows
 from himpc.qp import QPSolution
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 CONTRADICTION = "contradiction"
 """The status of a QP that has no feasible point."""

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.kinds import COLLISION
 from himpc.htmpc.kinematics import Placed, geometry, placed
@@ -14,10 +13,8 @@ from himpc.htmpc.prediction import integrator
 from himpc.htmpc.rows import ConstraintRows, ConstraintTable
 from himpc.tick.kernel.near import near
 from robots import Robot
+from robots.arrays import Array, Indices
 from robots.collision import Obstacle, surroundings
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

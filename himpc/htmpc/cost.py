@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.cost import model
 from himpc.htmpc.prediction import Start, integrator
 from himpc.htmpc.rows import ConstraintRows
 from himpc.htmpc.settings import Efforts
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 MU = 1e-3
 """Weight of the barrier (the HTMPC authors' published value)."""
@@ -89,13 +87,9 @@ def barrier(rows: ConstraintRows, u: Array) -> tuple[float, Array, Array]:
 
     B(h) = −μ ln h for h ≥ ζ. Below ζ, B is a parabola; value and two derivatives are continuous at ζ.
     """
-    value = rows.A @ u
-    above = np.isfinite(rows.upper)
-    below = np.isfinite(rows.lower)
-    h = np.concatenate([(rows.upper - value)[above], (value - rows.lower)[below]])
-    far = h >= ZETA
-    z = (h - 2.0 * ZETA) / ZETA
-    B = np.where(far, -np.log(np.maximum(h, ZETA)), 0.5 * (z**2 - 1.0) - np.log(ZETA))
+    above, below = np.isfinite(rows.upper), np.isfinite(rows.lower)
+    h, B = _relaxed(rows, u)
+    far, z = h >= ZETA, (h - 2.0 * ZETA) / ZETA
     first = np.where(far, -1.0 / np.maximum(h, ZETA), z / ZETA)
     second = np.where(far, 1.0 / np.maximum(h, ZETA) ** 2, 1.0 / ZETA**2)
     A = np.vstack([-rows.A[above], rows.A[below]])
@@ -104,9 +98,13 @@ def barrier(rows: ConstraintRows, u: Array) -> tuple[float, Array, Array]:
 
 def barrier_value(rows: ConstraintRows, u: Array) -> float:
     """Returns the value of `barrier` without its derivatives."""
+    return MU * float(_relaxed(rows, u)[1].sum())
+
+
+def _relaxed(rows: ConstraintRows, u: Array) -> tuple[Array, Array]:
+    """Returns the distances h from all bounds, those from upper bounds first, and B(h) / μ."""
     value = rows.A @ u
     h = np.concatenate([rows.upper - value, value - rows.lower])
     h = h[np.isfinite(h)]
     z = (h - 2.0 * ZETA) / ZETA
-    B = np.where(h >= ZETA, -np.log(np.maximum(h, ZETA)), 0.5 * (z**2 - 1.0) - np.log(ZETA))
-    return MU * float(B.sum())
+    return h, np.where(h >= ZETA, -np.log(np.maximum(h, ZETA)), 0.5 * (z**2 - 1.0) - np.log(ZETA))

@@ -8,7 +8,6 @@ from time import perf_counter_ns
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.plan import LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start
@@ -19,8 +18,7 @@ from himpc.references import Preview
 from himpc.stack import Stack
 from himpc.tasks import Task
 from robots import Robot
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 class Box(NamedTuple):

@@ -7,7 +7,6 @@ from time import perf_counter_ns
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.differential import Box, DifferentialController, Solved, wanted
 from himpc.htmpc.kernel.kinds import VELOCITY
@@ -18,8 +17,7 @@ from himpc.kinematics.configuration import Configuration
 from himpc.qp import QPSolution, solve_qp
 from himpc.references import Preview
 from himpc.stack import Level, Stack
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 @final

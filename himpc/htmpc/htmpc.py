@@ -1,4 +1,5 @@
-"""HTMPC: hierarchical-task MPC, section IV of the paper."""
+"""HTMPC: hierarchical-task MPC, section IV of the paper, and its variants with a single task or without a
+preview."""
 
 from __future__ import annotations
 
@@ -8,16 +9,14 @@ from itertools import accumulate
 from time import perf_counter_ns
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import ActiveSetSolver
 from himpc.htmpc.clearance import Avoidance, CollisionModel, clearance
-from himpc.htmpc.continuing import braking, shifted
 from himpc.htmpc.cost import Effort
 from himpc.htmpc.kernel.kinds import COLLISION, LEXICOGRAPHIC
 from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.plan import ActiveMotionRows, LevelEvidence, VelocityPlan
-from himpc.htmpc.prediction import Motion, Start, positions, underway, velocities
+from himpc.htmpc.prediction import Motion, Start, braking, positions, shifted, underway, velocities
 from himpc.htmpc.problem import Iterate, Problem, SharedStep
 from himpc.htmpc.rows import ConstraintRows, ConstraintTable, held, limit_rows
 from himpc.htmpc.safety import commandable, permitted, plausible
@@ -26,10 +25,10 @@ from himpc.htmpc.sqp import Solved, solve_level
 from himpc.htmpc.tracking import Guard, Tracking, check_dimensions, tracking
 from himpc.kinematics.configuration import Configuration, joint_indices
 from himpc.references import Preview
+from himpc.references.curves import still
 from himpc.stack import Stack
 from robots import Robot
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Integers
 
 _MEMORY = 200
 """Number of stored plans; it suffices for a delay of 1 s at 200 Hz."""
@@ -92,7 +91,7 @@ class HTMPC:
         """Returns the enabled levels that are solved."""
         return enabled
 
-    def _held(self, chosen: Stack, settings: HTMPCSettings) -> NDArray[np.int64]:
+    def _held(self, chosen: Stack, settings: HTMPCSettings) -> Integers:
         """Returns the columns of the joints that stay at rest."""
         return np.array(joint_indices(self.robot, settings.hold) if settings.hold else [], np.int64)
 
@@ -263,3 +262,23 @@ def _active_rows(
         for row, is_pair, pair in zip(some.tolist(), (kind == COLLISION).tolist(), part.tolist(), strict=True)
     )
     return ActiveMotionRows(kind, rows.knot[some], part, multipliers[some], names)
+
+
+class STMPC(HTMPC):
+    """Single-task MPC: (9) for the first enabled level of the stack. All other levels are ignored."""
+
+    def _chosen(self, enabled: Stack) -> Stack:
+        return enabled[:1]
+
+
+class HTMPC_WPT(HTMPC):
+    """HTMPC without a preview (section V-C): every reference is a waypoint, constant at its present value."""
+
+    def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
+        return super().step(q, v, {name: _frozen(preview) for name, preview in previews.items()})
+
+
+def _frozen(preview: Preview) -> Preview:
+    knots, m = preview.displacement.shape
+    rest = still(knots - 1, m)
+    return Preview(preview.value, rest.displacement, rest.velocity, rest.acceleration)

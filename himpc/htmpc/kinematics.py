@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.kinematics import frame_along
 from himpc.kinematics.configuration import Configuration
@@ -19,11 +18,8 @@ from himpc.tasks import FramePosition, OrientationTask, Task
 from himpc.tick.kernel.kinematics import ORIENTATION, POSITION
 from himpc.tick.kernel.placements import place_all
 from robots import InputError, Robot
+from robots.arrays import Array, Indices
 from robots.per_robot import per_robot
-
-Indices = NDArray[np.intp]
-Array = NDArray[np.float64]
-
 
 _TASK = np.array([[POSITION, 0, 0, 3], [ORIENTATION, 0, 3, 3]])
 _PART = np.array([0, 1, 2, 0, 1, 2])

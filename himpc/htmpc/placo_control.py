@@ -11,7 +11,6 @@ from time import perf_counter_ns
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.differential import Box, DifferentialController, Solved, wanted
 from himpc.htmpc.plan import ActiveMotionRows, LevelEvidence
@@ -22,11 +21,11 @@ from himpc.rotation import exp3
 from himpc.stack import Level, Stack
 from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
 from robots import InputError, Robot
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     import placo
 
-Array = NDArray[np.float64]
 Aim = Callable[[Configuration, Array], None]
 """Gives placo's task its target: the present value of our task, moved by the given coordinates, (m,)."""
 

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.kinds import KINDS
 from himpc.htmpc.prediction import Motion
 from himpc.htmpc.settings import MotionBounds
 from himpc.plan import Binding
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from robots.arrays import Array, Integers
 
 
 class ActiveMotionRows(NamedTuple):
@@ -22,9 +19,9 @@ class ActiveMotionRows(NamedTuple):
     `name` is the pair of a row of a distance, the coordinate of a row of (12), the cost of a row of (11), and
     "" for the rows of a joint."""
 
-    kind: IntArray
-    knot: IntArray
-    part: IntArray
+    kind: Integers
+    knot: Integers
+    part: Integers
     multiplier: Array
     name: tuple[str, ...]
 

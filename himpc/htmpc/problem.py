@@ -7,22 +7,19 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import ActiveSetSolver
 from himpc.htmpc.clearance import PENALTY, Avoidance, Clearances
-from himpc.htmpc.continuing import braking
 from himpc.htmpc.cost import Effort, barrier, barrier_value, gauss_newton
 from himpc.htmpc.kernel.kinds import LEXICOGRAPHIC
 from himpc.htmpc.kernel.rows import guard
 from himpc.htmpc.kinematics import Desired, Knots
-from himpc.htmpc.prediction import Start, coasting, integrator
+from himpc.htmpc.prediction import Start, braking, coasting, integrator
 from himpc.htmpc.rows import ConstraintRows, ConstraintTable
 from himpc.htmpc.settings import HTMPCSettings, MotionBounds
 from himpc.htmpc.tracking import Guard, Tracking
 from robots import Robot
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 PROXIMAL = 0.03
 """Factor on the effort weights in the proximal form, which serves damping only. With the full weights, a

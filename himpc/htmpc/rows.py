@@ -10,14 +10,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.kinds import ACCELERATION
 from himpc.htmpc.kernel.rows import RAMP_STEPS, STOP_STEPS, about, limits, spread
 from himpc.htmpc.prediction import Start, integrator
 from himpc.htmpc.settings import MotionBounds
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Integers, Mask
 
 
 class ConstraintRows(NamedTuple):
@@ -32,11 +30,11 @@ class ConstraintRows(NamedTuple):
     A: Array
     lower: Array
     upper: Array
-    kind: NDArray[np.int64]
-    knot: NDArray[np.int64]
-    part: NDArray[np.int64]
+    kind: Integers
+    knot: Integers
+    part: Integers
 
-    def take(self, chosen: NDArray[np.bool_]) -> ConstraintRows:
+    def take(self, chosen: Mask) -> ConstraintRows:
         """Returns the chosen rows."""
         A, lower, upper, kind, knot, part = self
         return ConstraintRows(
@@ -107,7 +105,7 @@ class ConstraintTable:
         self.labels[:, row:end] = rows.kind, rows.knot, rows.part
         return end
 
-    def spread(self, row: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
+    def spread(self, row: int, knot: Integers, slopes: Array, T_q: Array) -> Array:
         """Writes rows of functions of q, from index `row` on, and returns them. `slopes` (r, n) are the
         derivatives of the functions with respect to q at the knots (r,)."""
         self.reserve(row + len(knot))
@@ -135,9 +133,7 @@ def limit_rows(
     return table.absolute(count)
 
 
-def held(
-    rows: ConstraintRows, brake: Array, joints: NDArray[np.int64], table: ConstraintTable
-) -> ConstraintRows:
+def held(rows: ConstraintRows, brake: Array, joints: Integers, table: ConstraintTable) -> ConstraintRows:
     """Writes rows that bring some joints to rest with the inputs of `brake` (N, n). They replace the rows of
     these joints in `rows`. All rows are written to the beginning of the table."""
     N, n = brake.shape

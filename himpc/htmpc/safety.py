@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.prediction import Start
 from himpc.htmpc.settings import MotionBounds
 from robots import Robot
+from robots.arrays import Array
 from robots.per_robot import per_robot
-
-Array = NDArray[np.float64]
 
 _FASTEST = 20.0
 """A joint speed above this multiple of the robot's limit is a measurement error."""

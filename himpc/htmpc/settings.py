@@ -1,4 +1,5 @@
-"""The settings of hierarchical-task MPC; all of them may change while the robot moves."""
+"""The settings of hierarchical-task MPC, which may all change while the robot moves, and what they mean for a
+robot: bounds, weights, and the joints of its base."""
 
 from __future__ import annotations
 
@@ -6,23 +7,27 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from himpc.htmpc.base import UNICYCLE, Base, base_joints
 from himpc.qp import Solver, is_installed
 from himpc.stack import Stack, Weight, check_names
 from robots import InputError, Robot
+from robots.arrays import Array
 from robots.collision import Obstacle
+from robots.per_robot import per_robot
 from robots.ranges import SCALE, Range, Shown, check_fields
 
-Array = NDArray[np.float64]
 Formulation = Literal["proximal", "paper"]
 Lexicographic = Literal["per_coordinate", "cost"]
 FirstLevel = Literal["scaled", "hard", "soft"]
+Base = Literal["holonomic", "unicycle"]
 
 FORMULATIONS: tuple[Formulation, ...] = ("proximal", "paper")
 LEXICOGRAPHIC: tuple[Lexicographic, ...] = ("per_coordinate", "cost")
 MAX_HORIZON = 40
+UNICYCLE = (
+    "base is 'unicycle': its G(q) depends on the heading, and the condensed prediction needs G = I; "
+    "describe a holonomic base by two prismatic joints and one revolute joint instead"
+)
 _SCALE = "Factor on the limits of the robot"
 _WEIGHTS = Range(0.0, 1e9)
 _EFFORT = "Weight in the effort (10), equal for all joints"
@@ -80,7 +85,8 @@ class HTMPCSettings:
         obstacles: obstacles of the collision avoidance (7c).
         delay_s: delay of a command in s. The measured state is predicted forward by this time. The caller
             samples the references at t + delay_s.
-        base: how the base moves; see `himpc.htmpc.base.G`.
+        base: how the base moves. "holonomic": by two prismatic joints along world axes and a revolute joint,
+            so that its velocities are world velocities and G(q) of (4) is the identity, as for an arm.
         solver: the QP solver, see himpc.qp.Solver. HTIDKC uses it for every QP. HTMPC and its variants use a
             compiled method, and "daqp" if that method finds no solution. Any other value of `solver` replaces
             both.
@@ -176,6 +182,18 @@ class MotionBounds:
     v: Array
     a: Array
     j: Array
+
+
+@per_robot
+def base_joints(robot: Robot) -> tuple[int, ...]:
+    """Returns the columns of the joints of a mobile base: the unbounded joints at the root of the tree."""
+    count = 0
+    for joint in range(1, robot.n + 1):
+        chained = robot.model.parents[joint] == joint - 1 and robot.joints[joint - 1] == joint
+        if not chained or np.isfinite(robot.q_lower[joint - 1]) or np.isfinite(robot.q_upper[joint - 1]):
+            break
+        count = joint
+    return tuple(range(count)) if count >= 3 else ()
 
 
 def efforts(robot: Robot, settings: HTMPCSettings) -> Efforts:

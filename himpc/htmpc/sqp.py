@@ -6,15 +6,13 @@ from time import perf_counter_ns
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import CONTRADICTION
 from himpc.htmpc.clearance import PENALTY
 from himpc.htmpc.problem import Iterate, Problem
 from himpc.htmpc.rows import ConstraintRows
 from himpc.qp import QPSolution, solve_qp
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 SHRINK = 0.5
 """β of the backtracking line search (the HTMPC authors' value)."""

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc.kinematics import Desired, Knots
 from himpc.htmpc.settings import HTMPCSettings
 from himpc.stack import Level
 from himpc.tasks import Task
 from robots import InputError, Robot
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from robots import Robot
+from robots.arrays import Array
 from robots.errors import unknown_name
 from robots.per_robot import per_robot
 
 if TYPE_CHECKING:
     from himpc.references import Preview
-
-Array = NDArray[np.float64]
 
 
 @final

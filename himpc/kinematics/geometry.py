@@ -6,14 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from robots import Robot
+from robots.arrays import Array, Indices
 from robots.joints import joint_axis, joints_at_zero, motions
 from robots.per_robot import per_robot
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class Geometry(NamedTuple):

@@ -7,8 +7,7 @@ from himpc.limits.ramp import ramp
 from himpc.limits.rows import Rows, build_rows
 from himpc.limits.torque import TORQUE
 from himpc.limits.torque_rate import TORQUE_RATE
-from himpc.limits.velocity import VELOCITY, reaction
-from himpc.limits.viability import viability_bounds
+from himpc.limits.velocity import VELOCITY, reaction, viability_bounds
 
 __all__ = [
     "CONSTRAINTS",

@@ -7,13 +7,30 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.limits.limits import Limits, LimitsInForce
-from himpc.limits.near import Near
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
+from robots.arrays import Array, Mask
 
-Array = NDArray[np.float64]
+
+class Near(NamedTuple):
+    """The pairs of links, or of a link and an object, that could reach d_safe first; the nearest pair comes
+    first.
+
+    Attributes:
+        distance: d, (r,) m, negative inside.
+        gradient: ∇d, (r, n) m/rad.
+        moving: (r,) m/s, the speed at which the object's own motion reduces d.
+        share: (r,), the share of d_safe and of the margin that is kept: below 1 for links that are close
+            together in the home posture.
+        names: the name of each pair.
+    """
+
+    distance: Array
+    gradient: Array
+    moving: Array
+    share: Array
+    names: tuple[str, ...]
 
 
 class Moment(NamedTuple):
@@ -64,7 +81,7 @@ class Block(NamedTuple):
     lower: Array
     upper: Array
     directions: Directions | None = None
-    stopping: NDArray[np.bool_] | None = None
+    stopping: Mask | None = None
 
 
 @dataclass(frozen=True, eq=False)

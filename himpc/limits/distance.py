@@ -4,15 +4,12 @@ stop."""
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.constants import FADE, RETREAT, RETURN_RATE, WITHIN
-from himpc.limits.avoidance import MOST, Avoidance
-from himpc.limits.constraint import Block, Constraint, Directions, Moment
-from himpc.limits.near import Near
+from himpc.limits.constraint import Block, Constraint, Directions, Moment, Near
+from himpc.limits.limits import MOST, Avoidance
 from himpc.limits.velocity import approached, summed_twice
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 def row_count(n: int) -> int:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.limits.limits import LimitsInForce
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 RAMP_SECONDS = 0.5
 

@@ -6,17 +6,14 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from himpc.limits.constraint import Constraint, Directions, Moment
+from himpc.limits.constraint import Constraint, Directions, Moment, Near
 from himpc.limits.constraints import bit_of, imposed
 from himpc.limits.limits import Limits, LimitsInForce
-from himpc.limits.near import Near
 from himpc.limits.position import POSITION
 from himpc.limits.velocity import VELOCITY
-from himpc.prediction.joint import JointState
-
-Array = NDArray[np.float64]
+from himpc.prediction import JointState
+from robots.arrays import Array, Indices, Mask
 
 
 class Rows(NamedTuple):
@@ -43,7 +40,7 @@ class Rows(NamedTuple):
     lower: Array
     upper: Array
     constraints: tuple[Constraint, ...]
-    stopping: NDArray[np.bool_] | None = None
+    stopping: Mask | None = None
     rest: Array | None = None
     directions: tuple[Directions | None, ...] = ()
 
@@ -78,12 +75,12 @@ class Rows(NamedTuple):
         return np.asarray(A, np.float64)
 
     @property
-    def bits(self) -> NDArray[np.intp]:
+    def bits(self) -> Indices:
         """The bit of each row in `at_bound`, (r,)."""
         return np.repeat([bit_of(constraint) for constraint in self.constraints], self.L.shape[1])
 
     @property
-    def is_hard(self) -> NDArray[np.bool_]:
+    def is_hard(self) -> Mask:
         """Whether each row is hard, (r,): hard rows never give way."""
         return np.repeat([constraint.hard for constraint in self.constraints], self.L.shape[1])
 

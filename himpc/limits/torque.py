@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.limits.constraint import Block, Constraint, Moment, lags
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 def summed(N: int) -> Array:

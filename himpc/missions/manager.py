@@ -13,13 +13,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from himpc.kinematics.configuration import Configuration
 from himpc.missions.mission import Follow, Go, Mission, MissionTask, Point, check_mission, find
 from himpc.references import Reference
+from himpc.tasks import Task
 from robots import InputError
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 _CLOCK = 1e-9
 """Largest rounding error of a sum of control periods, s."""
@@ -214,3 +214,19 @@ def _ahead(progress: Progress, name: str) -> int:
 
 def _spliced(mission: Mission, start: int, end: int, *tasks: MissionTask) -> Mission:
     return (*mission[:start], *tasks, *mission[end:])
+
+
+def where(at: Configuration, roles: Mapping[str, Task]) -> tuple[dict[str, Array], dict[str, float]]:
+    """Returns the arguments `points` and `speeds` of `advanced`, by role.
+
+    Args:
+        at: the measured state.
+        roles: the task of each role.
+
+    Returns:
+        the position (m,) in m, or the rotation matrix (3, 3), of each role's point, and the speed of each
+        point in m/s or rad/s.
+    """
+    points = {name: task.value(at) for name, task in roles.items()}
+    speeds = {name: float(np.linalg.norm(task.jacobian(at)[0] @ at.v)) for name, task in roles.items()}
+    return points, speeds

@@ -7,14 +7,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.references import Hold, Law, Path, Reference, Started
 from himpc.rotation import from_quaternion
 from robots import InputError
+from robots.arrays import Array
 from robots.errors import unknown_name
 
-Array = NDArray[np.float64]
 Point = tuple[float, ...]
 
 

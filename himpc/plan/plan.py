@@ -7,14 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.cascade.level import LevelSolution
 from himpc.limits import LimitsInForce, Rows
 from himpc.telemetry import Layout
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 class Binding(NamedTuple):

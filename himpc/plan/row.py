@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.cascade.level import ActiveRows
 from himpc.limits import Rows
 from himpc.limits.constraints import bit_of
@@ -16,8 +13,7 @@ from himpc.references import Preview
 from himpc.rotation import quaternion
 from himpc.tasks.axes import AXES
 from himpc.telemetry import Layout, TaskInfo
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 def write_plan(row: Array, layout: Layout, plan: Plan, ahead: Mapping[str, Preview]) -> None:

@@ -1,14 +1,73 @@
-"""Closed curves as functions of a phase: ellipses (circles included) and the figure-eight."""
+"""Motions that a few coefficients describe: constants, ellipses (circles included), the figure-eight and
+sinusoids, with the time laws of their phases."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from himpc.references.phase import Phase, column
-from himpc.references.preview import Array, Preview, sampled, times
+from himpc.references.preview import Preview, Reference, sampled, times
+from robots.arrays import Array
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A phase φ(t), its rate and its acceleration.
+
+    The law `uniform` is φ = ωt + φ₀. The law `eased` is φ = ωt − sin ωt + φ₀; each turn starts and ends at
+    rest.
+
+    Attributes:
+        omega: angular frequency ω, rad/s.
+        law: "uniform" or "eased".
+        offset: φ₀, rad.
+    """
+
+    omega: float
+    law: Literal["uniform", "eased"] = "uniform"
+    offset: float = 0.0
+
+    def at(self, t: Array) -> tuple[Array, Array | float, Array | float]:
+        """Returns (φ, φ̇, φ̈) at times t in seconds; constant derivatives are plain numbers."""
+        w, wt = self.omega, self.omega * t
+        if self.law == "uniform":
+            return wt + self.offset, w, 0.0
+        return wt - np.sin(wt) + self.offset, w * (1 - np.cos(wt)), w * w * np.sin(wt)
+
+
+def column(rate: Array | float) -> Array | float:
+    """Returns an array with one rate per sample as a column, which can be multiplied by rows of coordinates.
+    A plain number is returned unchanged."""
+    return rate[:, None] if isinstance(rate, np.ndarray) else rate
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """A constant x_d.
+
+    Attributes:
+        value: (m,) coordinates, or a rotation matrix (3, 3).
+        m: number of coordinates that the task controls. It is needed only if it differs from the size of the
+            value (an orientation task on fewer than three axes).
+    """
+
+    value: Array
+    m: int | None = None
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        rest = still(N, self.m or self.value.shape[0])
+        return Preview(self.value, rest.displacement, rest.velocity, rest.acceleration)
+
+
+@lru_cache(maxsize=64)
+def still(N: int, m: int) -> Preview:
+    """Returns the preview of m coordinates that rest at zero."""
+    zeros = np.zeros((N + 1, m))
+    zeros.setflags(write=False)
+    return Preview(zeros[0], zeros, zeros, zeros)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,3 +134,32 @@ class Sinusoid:
         slope = np.cos(phi)[:, None] * self.amplitude
         rate, acceleration = column(rate), column(acceleration)
         return sampled(self.offset + swing, rate * slope, acceleration * slope - rate * rate * swing)
+
+
+class Curve(NamedTuple):
+    """x_d = c + a cos φ + b sin φ + d sin 2φ.
+
+    Attributes:
+        centre: c, (m,); or a constant rotation matrix.
+        swing: a, b and d, each (m,) or 0.
+        phase: time law φ(t); None: x_d is constant at `centre`.
+    """
+
+    centre: Array
+    swing: tuple[Array | float, Array | float, Array | float] = (0.0, 0.0, 0.0)
+    phase: Phase | None = None
+
+
+def curve_of(reference: Reference) -> Curve | None:
+    """Returns the coefficients of a reference; None for a reference that can only be sampled by `preview`."""
+    match reference:
+        case Hold():
+            return Curve(reference.value)
+        case Circle():
+            return Curve(reference.centre, (reference.u, reference.w, 0.0), reference.phase)
+        case FigureEight():
+            return Curve(reference.centre, (0.0, reference.u, 0.5 * reference.w), reference.phase)
+        case Sinusoid():
+            return Curve(reference.offset, (0.0, reference.amplitude, 0.0), reference.phase)
+        case _:
+            return None

@@ -1,12 +1,29 @@
-"""All references at one control tick."""
+"""What a controller knows at one control tick: all references, and the objects around the robot."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import final
+from typing import NamedTuple, final
 
-from himpc.references.observed import NOTHING, Observed
 from himpc.references.preview import Preview, Reference
+from robots.arrays import Array
+from robots.cover_shapes import WorldShape
+
+
+class Observed(NamedTuple):
+    """The objects around the robot, as a controller knows them at a tick. The real objects may differ.
+
+    Attributes:
+        shapes: the objects at their present positions.
+        velocity: velocities of the objects' centres, (B, 3) m/s; None: the objects are at rest.
+    """
+
+    shapes: tuple[WorldShape, ...] = ()
+    velocity: Array | None = None
+
+
+NOTHING = Observed()
+"""No known objects."""
 
 
 @final

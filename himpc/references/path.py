@@ -1,4 +1,4 @@
-"""Paths of the EE and base planners: straight or quintic motion through points at a cruise speed."""
+"""Motions through points: straight and quintic paths, and the square wave, which jumps."""
 
 from __future__ import annotations
 
@@ -8,10 +8,44 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from himpc.references.preview import Array, Preview, sampled, times
-from himpc.references.waypoints import Waypoints
+from himpc.references.preview import Preview, sampled, times
 from robots import InputError
+from robots.arrays import Array
 from robots.errors import unknown_name
+
+
+@dataclass(frozen=True, eq=False)
+class Waypoints:
+    """x_d moves through points and is at rest at each point, with s(σ) = 10σ³ − 15σ⁴ + 6σ⁵ on every segment.
+
+    Attributes:
+        points: (P, m) waypoints, P ≥ 1.
+        arrivals: (P,) increasing times in seconds at which the points are reached. Before the first and after
+            the last of these times, the reference is constant.
+    """
+
+    points: Array
+    arrivals: Array
+
+    def __post_init__(self) -> None:
+        if len(self.points) != len(self.arrivals) or (np.diff(self.arrivals) <= 0).any():
+            raise ValueError("each waypoint needs an arrival time, and the times must increase strictly")
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        clock = times(t, T_s, N)
+        if len(self.points) == 1:
+            still = np.repeat(self.points, N + 1, axis=0)
+            return sampled(still, np.zeros_like(still), np.zeros_like(still))
+        segment = np.clip(np.searchsorted(self.arrivals, clock, side="right") - 1, 0, len(self.points) - 2)
+        start, duration = self.arrivals[segment], np.diff(self.arrivals)[segment][:, None]
+        step = np.diff(self.points, axis=0)[segment]
+        s = np.clip((clock - start)[:, None] / duration, 0.0, 1.0)
+        return sampled(
+            self.points[segment] + step * (s**3 * (10 - 15 * s + 6 * s * s)),
+            step * (30 * s * s * (1 - s) ** 2) / duration,
+            step * (60 * s * (1 - s) * (1 - 2 * s)) / duration**2,
+        )
+
 
 Law = Literal["straight", "quintic"]
 LAWS: tuple[Law, ...] = get_args(Law)
@@ -81,6 +115,31 @@ class Path:
         return sampled(position, slopes[line] * moving[:, None], np.zeros_like(position))
 
 
-def segment(start: Array, goal: Array, cruise: float, law: Law = "quintic", at: float = 0.0) -> Path:
-    """Returns the path from one point to another, which starts at the time `at`, s."""
-    return Path(np.array([start, goal], float), cruise, law, at)
+_EARLY = 1e-9
+"""A switch takes place earlier by this time, s, so that the rounding error of a sum of periods cannot delay
+the switch by a sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class SquareWave:
+    """x_d is at the peak for half a period and then in the valley for half a period, repeatedly. ẋ_d = ẍ_d =
+    0.
+
+    Attributes:
+        peak, valley: (m,) m.
+        half_period: duration of half a period, s.
+        waves: number of periods, after which x_d stays in the valley; None: the wave never ends.
+    """
+
+    peak: Array
+    valley: Array
+    half_period: float = 8.0
+    waves: int | None = None
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        half = np.floor((times(t, T_s, N) + _EARLY) / self.half_period)
+        down = half % 2 == 1
+        if self.waves is not None:
+            down |= half >= 2 * self.waves
+        position = np.where(down[:, None], self.valley, self.peak)
+        return sampled(position, np.zeros_like(position), np.zeros_like(position))

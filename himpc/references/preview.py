@@ -8,9 +8,8 @@ from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 class Preview(NamedTuple):

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from himpc.references.preview import Array, Preview
+from himpc.references.preview import Preview
+from robots.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from himpc.tasks.axes import AXES, OnAxes
-from himpc.tasks.task import Array
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from himpc.tasks.frame import FrameTask
-from himpc.tasks.task import Array
+from himpc.tasks.axes import FrameTask
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal, final
 
 import numpy as np
 
-from himpc.tasks.task import Array, Gain, Task
+from himpc.tasks.task import Gain, Task
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration

@@ -13,7 +13,8 @@ from himpc.references.preview import Preview
 from himpc.rotation import exp3, log3
 from himpc.tasks.axes import AXES, OnAxes
 from himpc.tasks.seen import NUDGE, at_rest, rests, seen
-from himpc.tasks.task import Array, Gain
+from himpc.tasks.task import Gain
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration

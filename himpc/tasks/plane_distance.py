@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from himpc.tasks.task import Array, Task
+from himpc.tasks.task import Task
 from robots import InputError
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration

@@ -11,7 +11,8 @@ from himpc.references.preview import Preview
 from himpc.rotation import exp3
 from himpc.tasks.axes import AXES
 from himpc.tasks.seen import NUDGE, at_rest, rests, seen
-from himpc.tasks.task import Array, Gain, Task
+from himpc.tasks.task import Gain, Task
+from robots.arrays import Array
 from robots.errors import unknown_name
 
 if TYPE_CHECKING:

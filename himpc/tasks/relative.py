@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from himpc.tasks.axes import OnAxes
 from himpc.tasks.orientation import OrientationTask
-from himpc.tasks.task import Array
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration

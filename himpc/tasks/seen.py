@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from himpc.references.preview import Preview
-from himpc.tasks.task import Array
+from robots.arrays import Array
 
 NUDGE = 1e-4
 """Time step of the central difference of G along the motion, to each side, s."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.arrays import Array
 from robots.ranges import Range, Shown
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from himpc.references import Preview
     from robots import Robot
 
-Array = NDArray[np.float64]
 GAINS = Range(0.0, 1e8)
 """At the shortest control period, 0.1 ms, an error times this K_p crosses zero within one period."""
 Gain = Annotated[float | tuple[float, ...], GAINS]

@@ -15,9 +15,9 @@ from himpc.limits.constraints import bit_of, imposed
 from himpc.limits.rows import profiles
 from himpc.limits.velocity import approached, reaction
 from himpc.references import Preview, Reference
-from himpc.references.curve import curve_of
+from himpc.references.curves import curve_of
 from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
-from himpc.tasks.frame import AXES, FrameTask
+from himpc.tasks.axes import AXES, FrameTask
 from himpc.tasks.joints import OnJoints
 from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from himpc.constants import MOVING, MOVING_ANYWHERE, WITHIN
 from himpc.kinematics.geometry import Geometry, geometry
-from himpc.limits.avoidance import Avoidance
+from himpc.limits.constraint import Near
 from himpc.limits.distance import row_count
-from himpc.limits.near import Near
-from himpc.references.observed import NOTHING, Observed
+from himpc.limits.limits import Avoidance
+from himpc.references.outlook import NOTHING, Observed
 from himpc.tick.kernel.arena import Arena, laid_out
 from himpc.tick.kernel.distance_rows import (
     CHANGED,

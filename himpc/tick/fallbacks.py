@@ -11,7 +11,7 @@ from himpc.cascade.last_resort import containing, last_resort, softened, towards
 from himpc.cascade.level import FALLBACKS, Fallback
 from himpc.limits import Rows
 from himpc.limits.rows import coming_to_rest
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PERIOD, T_S, Array
 from himpc.tick.kernel.cascade import ALONE, FIRST, KNOTS, LAST, SOFTENED

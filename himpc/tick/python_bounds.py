@@ -11,8 +11,8 @@ from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce, Rows
 from himpc.limits.constraint import Constraint, Directions, Moment
 from himpc.limits.distance import DISTANCE
-from himpc.prediction.joint import JointState
-from himpc.references.observed import Observed
+from himpc.prediction import JointState
+from himpc.references.outlook import Observed
 from himpc.tick.distances import Distances
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PERIOD

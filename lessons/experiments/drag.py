@@ -10,20 +10,18 @@ from time import process_time
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from himpc.references.target import POSITION_CAPS
 from lessons.events import MoveTarget
 from lessons.scenes.hold import hold_robot
 from lessons.session.start import begin
 from robots import Robot
+from robots.arrays import Array
 from robots.covering.covers import near
 from robots.errors import listed, shortened
 from robots.loading.home import chain_length
 from robots.plant import Plant
 from robots.reach import ReachJudge
-
-Array = NDArray[np.float64]
 
 SHARE = 0.15
 """Length of the drag as a share of the arm's length."""
@@ -96,7 +94,7 @@ def dragged(robot: Robot) -> Motion:
     length = SHARE * chain_length(robot.model, robot.frame_id(robot.tip))
     avoidance = scene.settings.limits.avoidance
     kept = avoidance.d_safe + avoidance.margin if avoidance.on else 0.0
-    there, home = target(robot, length, bool(scene.world), kept), _points(robot, robot.home)[-1]
+    there, home = target(robot, length, bool(scene.world), kept), skeleton(robot, robot.home)[-1]
     if there is None:
         return Motion(0.0)
     points, drag = (there, home), float(np.linalg.norm(there - home))
@@ -160,14 +158,14 @@ def target(robot: Robot, drag: float, floor: bool, kept: float = 0.0) -> Array |
     """
     judge, span = ReachJudge(robot), np.clip(robot.q_upper - robot.q_lower, 0.0, 2.0 * np.pi)
     low, high = robot.q_lower + _MARGIN, robot.q_upper - _MARGIN
-    home = _points(robot, robot.home)
+    home = skeleton(robot, robot.home)
     least = min(0.5 * drag, float(home[:, 2].min())) - 1e-3 if floor else -math.inf
     candidates: list[tuple[bool, float, int, Array, Array]] = []
     for index, signs in enumerate(corner for corner in product((0.0, 1.0, -1.0), repeat=3) if any(corner)):
         way = np.array(signs) / np.linalg.norm(signs)
         result = judge.solve(home[-1] + drag * way)
         q = np.clip(result.q, np.minimum(low, robot.home), np.maximum(high, robot.home))
-        points = _points(robot, q)
+        points = skeleton(robot, q)
         far = float(np.linalg.norm(points[-1] - home[-1])) >= 0.5 * drag
         if far and float(points[:, 2].min()) >= least:
             turn = float((np.abs(q - robot.home) / span).max())
@@ -180,8 +178,8 @@ def target(robot: Robot, drag: float, floor: bool, kept: float = 0.0) -> Array |
     return None if best is None else best[-1]
 
 
-def _points(robot: Robot, q: Array) -> Array:
-    """Returns the positions of all joints and of the tip, (n + 1, 3) m."""
+def skeleton(robot: Robot, q: Array) -> Array:
+    """Returns the origins of all joints and the tip in the world, (n + 1, 3) m."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, q)
     joints = [placed.translation for placed in list(data.oMi)[1:]]

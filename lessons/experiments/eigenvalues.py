@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.events import MoveTarget, Set
 from lessons.experiments.jobs import JobResult, Work
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.session.torque import TorqueSession
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Mask
 
 _SECONDS = 4.0
 
@@ -67,7 +65,7 @@ class EigenvalueJob(Work):
         return JobResult(self, figures, {"t": t[:, None], "largest": np.array(largest)[:, None]})
 
 
-def longest(flags: NDArray[np.bool_]) -> int:
+def longest(flags: Mask) -> int:
     """Returns the length of the longest sequence of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
     return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.parallel import FailedJob, on_cores, one_by_one
 from lessons.recording.run import Recording, run
 from lessons.recording.summary import summary
 from lessons.scenes.run_spec import RunSpec
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 TIMING_KEYS = ("step_ms", "real_time_factor")
 """Keys of a summary whose values differ from run to run; all other values are equal to the last bit."""

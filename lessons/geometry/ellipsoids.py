@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from himpc.stack import Stack
 from himpc.tasks import FrameOrientation, FramePosition
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 _GONE = 1e-6
 """Directions in which joints of unit speed move a frame more slowly than this, m/s or rad/s, count as

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.controllers import HIMPC, OSF, Weighted
@@ -18,8 +17,7 @@ from lessons.geometry.plane import Plane, cut
 from lessons.session.bumpless import Handover
 from lessons.session.torque import TorqueSession
 from robots import InputError
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

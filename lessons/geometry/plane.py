@@ -13,13 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.cascade.level import LevelProblem
 from himpc.constants import RANK_TOLERANCE
 from himpc.limits import Rows
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 _HELD = 1e-9
 """N·m: a solution nearer to a cut than this counts as lying in it."""

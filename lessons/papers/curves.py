@@ -6,26 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.experiments.jobs import JobResult
-from lessons.papers.item import Row, Section
-from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
+from lessons.plots.panels import Panel, PlotCurve
 from lessons.plots.style import name
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Mask
 
 
 def curve(run: JobResult, field: str, k: int = 0, scale: float = 1.0, **how: object) -> PlotCurve:
     """Returns the curve of a field of a run over time; nothing is drawn for a run that failed."""
     return PlotCurve(run.t, scale * run.column(field, k), **how)  # pyright: ignore[reportArgumentType]
-
-
-def drawn(
-    name: str, caption: str, panels: Sequence[Panel | Bars], columns: int = 1, rows: tuple[Row, ...] = ()
-) -> Section:
-    """Returns a section with one picture."""
-    return Section(rows=rows, pictures=(Picture(name, caption, tuple(panels), columns),))
 
 
 _BROAD = (2.4, 1.0)
@@ -116,7 +106,7 @@ def _largest(curve: PlotCurve) -> PlotCurve:
     return band if band.y_to is None else replace(band, y=band.y_to, y_to=None, style="line")
 
 
-def spans(t: Array, inside: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
+def spans(t: Array, inside: Mask) -> tuple[tuple[float, float], ...]:
     """Returns the intervals of time in which `inside` is true; gaps of less than BAND are closed."""
     times = t[inside]
     if not times.size:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal
 
 from lessons.experiments.jobs import Results, Work
@@ -167,20 +166,6 @@ class Item:
     source: str
     jobs: Callable[[bool], tuple[Work, ...]]
     report: Callable[[Results, bool], Section]
-
-
-def figures(
-    *rows: tuple[int, str, str, tuple[Work, ...], Callable[[Results, bool], Section]],
-) -> tuple[Item, ...]:
-    """Returns the items of figures of HIMPC's paper: (number, title, source, runs, report)."""
-    return tuple(
-        Item(f"himpc-fig-{number}", title, source, partial(_always, runs), report)
-        for number, title, source, runs, report in rows
-    )
-
-
-def _always(runs: tuple[Work, ...], quick: bool) -> tuple[Work, ...]:
-    return runs
 
 
 def at_most(text: str, value: float, limit: float, band: float | None = CLOSE) -> PaperCheck:

@@ -12,13 +12,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from lessons.outputs import write_files
 from lessons.plots.draw import label_values, png
 from lessons.plots.style import RC
+from robots.arrays import Array, Mask
 
-Array = NDArray[np.float64]
 _HATCHED: dict[str, Any] = {"edgecolor": "#B3261E", "linewidth": 0.0}
 _LOST = {"facecolor": "#F3D9D6", "hatch": "////", **_HATCHED}
 _FAILED = {"facecolor": "#D5D9DE", "hatch": "xxxx", **_HATCHED}
@@ -40,11 +39,11 @@ class SweepMap(NamedTuple):
     values: tuple[tuple[float, ...], ...]
     log: tuple[bool, ...]
     z: Array
-    diverged: NDArray[np.bool_]
-    failed: NDArray[np.bool_]
+    diverged: Mask
+    failed: Mask
 
     @property
-    def marks(self) -> tuple[tuple[str, NDArray[np.bool_], dict[str, Any]], ...]:
+    def marks(self) -> tuple[tuple[str, Mask, dict[str, Any]], ...]:
         """The names, masks and styles of the cells without a value."""
         return ("control lost", self.diverged, _LOST), ("could not be run", self.failed, _FAILED)
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.telemetry import Layout
 from lessons.plots.panels import Panel, Picture, PlotCurve
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 _FLOOR = 1e-3  # mm or °
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.constants import RETURN_RATE
 from himpc.htmpc.settings import bounds
@@ -20,11 +19,10 @@ from lessons.settings.torque import TorqueSettings
 from lessons.settings.values import finite
 from lessons.settings.velocity import VelocitySettings
 from robots import Robot
+from robots.arrays import Array
 
 if TYPE_CHECKING:
     from lessons.recording.run import Recording
-
-Array = NDArray[np.float64]
 
 
 _PER_JOINT = (
@@ -59,7 +57,7 @@ def named(
     - `tau_0`: the torque that acted until the tick; at velocity level, the command;
     - `tip`: the name of the frame; `a_max`: (n,);
     - `position_margin` (rad), `position_reaction` (s), `position_return_rate` (1/s): the constants of
-      `himpc.limits.viability`, NaN if this limit is not in force.
+      `himpc.limits.velocity`, NaN if this limit is not in force.
 
     The values of x_d, v_d and a_d at the next knot are in the next row.
 

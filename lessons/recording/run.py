@@ -7,15 +7,13 @@ from time import perf_counter
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.telemetry import Layout, relaid
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
 from lessons.session.start import begin
 from robots import InputError
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 @final

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.catalog import qp_method
 from himpc.telemetry import TaskInfo
@@ -17,8 +16,7 @@ from lessons.session.torque import TorqueSession
 from lessons.session.velocity import VelocitySession
 from lessons.settings.period import warning
 from lessons.settings.values import finite, peak
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Mask
 
 
 def summary(recording: Recording) -> dict[str, Any]:
@@ -231,7 +229,7 @@ _BLOCKS: Mapping[type[Session], Callable[[Recording], dict[str, Any]]] = {
 # ---------------------------------------------------------------- at both levels
 
 
-def _task(recording: Recording, task: TaskInfo, level: int, rows: NDArray[np.bool_]) -> dict[str, Any]:
+def _task(recording: Recording, task: TaskInfo, level: int, rows: Mask) -> dict[str, Any]:
     """Returns the errors of a task: root mean squares and peaks per coordinate, m or degrees.
 
     Args:

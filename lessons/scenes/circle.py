@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import Limits
@@ -17,8 +16,7 @@ from himpc.tasks import FrameOrientation, FramePosition, Joints
 from lessons.scenes.scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import Plant, PlantSettings, Robot, load_robot
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 OMEGA = 0.5 * np.pi
 """Angular frequency, rad/s; RT4 repeats after 4 s."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from himpc.limits import Limits
-from himpc.limits.avoidance import Avoidance
+from himpc.limits.limits import Avoidance
 from himpc.stack import Level, freedom_left
 from himpc.tasks import FrameOrientation, FramePosition, Posture
 from lessons.scenes.scene import TorqueScene

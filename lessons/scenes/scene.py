@@ -7,9 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.references import Reference
 from himpc.stack import Stack
 from lessons.events import Event
@@ -17,9 +14,8 @@ from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
 from lessons.settings.velocity import VelocitySettings
 from robots import Robot
+from robots.arrays import Array
 from robots.world import World
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.controllers import HIMPC, Controller, Settings
 from himpc.controllers.distance_filter import DistanceFilter
@@ -15,8 +14,7 @@ from himpc.plan import Plan
 from himpc.references import Preview
 from himpc.references.outlook import observed_by
 from robots import InputError
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 HANDOVER_SECONDS = 0.3
 

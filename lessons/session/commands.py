@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc import VelocityPlan
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 class DelayedTorque:

@@ -6,9 +6,6 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.controllers import Controller, make_controller
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
@@ -19,9 +16,7 @@ from lessons.own.kinds import law_of, line_of
 from lessons.own.load import CallDeadline, TooLong, alone, judged, load
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array
 
 LONGEST_TICK = 0.5
 """Time, s, that one call may compute or sleep; a control period is one or a few milliseconds."""

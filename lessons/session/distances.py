@@ -7,18 +7,16 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc import HTMPCSettings
 from himpc.htmpc.clearance import CollisionModel
-from himpc.limits.avoidance import Avoidance
-from himpc.references.observed import Observed
+from himpc.limits.limits import Avoidance
+from himpc.references.outlook import Observed
 from himpc.tick.distances import Distances
 from robots import Plant, Robot
+from robots.arrays import Array
 from robots.collision import Ball, Box, Floor, Obstacle
 from robots.world import Post, Thing
-
-Array = NDArray[np.float64]
 
 
 def objects_of(plant: Plant) -> Observed:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc import VelocityPlan, base_joints
 from himpc.kinematics.configuration import Configuration
@@ -15,8 +14,7 @@ from himpc.references import Reference
 from himpc.stack import Stack
 from himpc.tasks import Task
 from himpc.telemetry import AT_ACCELERATION, AT_POSITION, AT_VELOCITY, Layout
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 def dynamic_leak(M: Array, done: AtOnce) -> float:

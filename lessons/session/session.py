@@ -9,7 +9,6 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Binding, TickPlan
@@ -18,8 +17,8 @@ from lessons.events import Event, Reset, Set
 from lessons.scenes.scene import Scene
 from lessons.settings.settings import SceneSettings
 from robots import InputError, Plant, PlantState, Robot, VelocityPlant
+from robots.arrays import Array
 
-Array = NDArray[np.float64]
 AnyPlan = TypeVar("AnyPlan", bound=TickPlan)
 
 LOST_SPEED = 20.0

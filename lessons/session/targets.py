@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.controllers import dragged_target
 from himpc.references import JOINT_CAPS, POSITION_CAPS, ROTATION_CAPS, Reference, Target
@@ -15,9 +14,8 @@ from himpc.stack import about, essence
 from himpc.tasks import Pointing, Task
 from himpc.tasks.axes import OnAxes
 from robots import InputError
+from robots.arrays import Array
 from robots.errors import unknown_name
-
-Array = NDArray[np.float64]
 
 
 def target_at(task: Task, value: Array) -> Target:

@@ -13,7 +13,7 @@ from himpc.controllers import Controller
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Plan, write_plan
 from himpc.references import Outlook, Preview, Reference, Target
-from himpc.references.observed import NOTHING
+from himpc.references.outlook import NOTHING
 from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.htmpc import HTMPCSettings, VelocityPlan, base_joints, bounds
 from himpc.kinematics.configuration import Configuration
@@ -25,9 +24,8 @@ from lessons.settings.missions import OrderOptions
 from lessons.settings.settings import SceneSettings
 from lessons.settings.velocity import VelocitySettings
 from robots import InputError, PlantState, VelocityPlant
+from robots.arrays import Array
 from robots.errors import unknown_name
-
-Array = NDArray[np.float64]
 
 
 @final

@@ -9,16 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.missions import Follow, Go, Mission, MissionTask
 from himpc.references import Hold, Path, SquareWave
 from robots import InputError
+from robots.arrays import Array
 from robots.collision import Ball, Box, Floor, Obstacle
 from robots.ranges import Range, Shown, check_fields
-
-Array = NDArray[np.float64]
-
 
 Home = Mapping[str, Array]
 Architecture = Literal["hierarchical", "single_task", "decoupled"]

@@ -8,10 +8,10 @@ from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.own.files import by_name
 from robots import InputError
+from robots.arrays import Array
 from robots.errors import unknown_name
 from robots.ranges import ANY, Range, alternatives, plain
 
@@ -116,7 +116,7 @@ def _quoted(value: Any) -> str:
     return text if len(text) <= 80 else text[:60] + " …"
 
 
-def peak(values: NDArray[np.float64]) -> float | None:
+def peak(values: Array) -> float | None:
     """Returns the largest finite value, None if there is none."""
     numbers = values[np.isfinite(values)]
     return float(numbers.max()) if numbers.size else None

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY
+from robots.arrays import Array
 
-Array = NDArray[np.float64]
 Statistic = Literal["largest", "smallest", "rms", "mean", "range", "last", "sum"]
 
 UNITS: dict[str, float] = {

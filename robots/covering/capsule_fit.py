@@ -6,12 +6,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.arrays import Array, Indices, Mask
 from robots.geometry import directions
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _ROUNDS = 12  # number of steps of the search for the middle of a circle
 _DIGITS = 4  # decimal places of a coordinate in m
 _FEW, _MANY = 48, 100  # numbers of directions in which a quick and a tight fit look for farthest points
@@ -88,7 +86,7 @@ def _rounded(points: Array, swell: Array, start: Array, end: Array) -> Fit:
     return Fit(start, end, np.ceil((needed + 1e-9) * 10**_DIGITS) / 10**_DIGITS)
 
 
-def _farthest(points: Array, swell: Array) -> NDArray[np.intp]:
+def _farthest(points: Array, swell: Array) -> Indices:
     """Returns the indices of the balls that are farthest out in one of the directions."""
     most, found = np.full(_MANY, -np.inf), np.zeros(_MANY, np.intp)
     for first in range(0, len(points), _BLOCK):

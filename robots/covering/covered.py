@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from robots.arrays import Array
 from robots.geometry import Solid
 from robots.robot import Robot
 from robots.shapes.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
 from robots.shapes.read import described_shapes, mesh_surfaces
 
-Array = NDArray[np.float64]
 _SECTIONS = 24  # number of sides of the polygon that replaces a circle
 _MOST = 250_000  # largest number of triangles of a robot
 

@@ -11,17 +11,14 @@ from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.arrays import Array, Indices, Mask
 from robots.covering.capsule_fit import Fit, quick_fits, reach, tight_fit
 from robots.covering.covered import Patch
 from robots.geometry import Capsule
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 _FINE = 15  # edges are cut if they are longer than the largest extent of a body divided by this
@@ -95,7 +92,7 @@ class Body:
         areas, points = np.repeat(fits.area / count, count)[outer], points[outer]
         return np.maximum(self._nearby.query(points)[0] - self.swells.max(), 0.0), areas
 
-    def name(self, mask: NDArray[np.bool_]) -> str:
+    def name(self, mask: Mask) -> str:
         """Returns the name of the link that has the largest area among some triangles."""
         return self.names[int(np.bincount(self.links[mask], weights=self.areas[mask]).argmax())]
 

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from robots.arrays import Array
 from robots.per_robot import per_robot
 from robots.robot import Robot
 
 if TYPE_CHECKING:
     from robots.meshes.surfaces import Piece
-
-Array = NDArray[np.float64]
 
 
 class DescribedShape(NamedTuple):

@@ -18,10 +18,10 @@ from himpc.export.image import MULTIPLE
 from himpc.export.kernel import fallbacks, whole_tick
 from himpc.export.native import NativeController
 from himpc.limits import in_force
-from himpc.limits.braking import least_slack, missed
 from himpc.limits.limits import LimitsInForce
+from himpc.limits.rest import least_slack, missed
 from himpc.limits.rows import build_rows
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
 from himpc.references.outlook import Outlook
 from himpc.tick.distances import Distances
 from himpc.tick.kernel import control_period

@@ -13,7 +13,7 @@ from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.controllers.printed_tick import solve
 from himpc.limits import POSITION, TORQUE, VELOCITY, Rows
 from himpc.limits.constraint import Constraint
-from himpc.prediction.task import residual_model
+from himpc.prediction import residual_model
 from himpc.qp import Solver
 from himpc.tick.problems import solve_problems
 

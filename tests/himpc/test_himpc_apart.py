@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from himpc.limits import TORQUE, VELOCITY, Rows
-from himpc.limits.braking import braking, least_slack, missed
 from himpc.limits.constraint import Directions
 from himpc.limits.distance import DISTANCE
+from himpc.limits.rest import braking, least_slack, missed
 from himpc.limits.rows import profiles
 
 N, n = 5, 3

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from himpc.limits import POSITION, TORQUE, VELOCITY, Limits, Rows, build_rows, in_force
-from himpc.limits.braking import braking, least_slack
+from himpc.limits.rest import braking, least_slack
 from himpc.limits.rows import profiles
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
 from robots import load_robot
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from himpc import CONTROLLERS, HIMPC, FramePosition, Joints, Level, Limits
 from himpc.controllers import make_controller
-from himpc.limits.avoidance import Avoidance
+from himpc.limits.limits import Avoidance
 from robots import InputError, NominalSettings, Robot
 
 Array = NDArray[np.float64]

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from himpc.constants import MOVING, SLOWEST
 from himpc.controllers.stall_guard import StallGuard
 from himpc.limits import Limits, in_force
-from himpc.limits.avoidance import Avoidance
+from himpc.limits.constraint import Near
 from himpc.limits.distance import least_rates
-from himpc.limits.near import Near
-from himpc.references.observed import Observed
+from himpc.limits.limits import Avoidance
+from himpc.references.outlook import Observed
 from himpc.tick.distances import Distances
 from robots import Robot, load_robot
 from robots.collision import Ball, Box, Floor

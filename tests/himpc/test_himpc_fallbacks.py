@@ -18,7 +18,7 @@ from problems import Hierarchy, random_hierarchy
 from himpc import qp
 from himpc.cascade.last_resort import containing
 from himpc.limits import Rows
-from himpc.limits.braking import least_slack
+from himpc.limits.rest import least_slack
 
 Array = NDArray[np.float64]
 

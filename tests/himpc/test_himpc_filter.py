@@ -14,12 +14,11 @@ from himpc.controllers import Settings, make_controller
 from himpc.controllers.distance_filter import DistanceFilter, Filtered
 from himpc.controllers.himpc_filtered import FilteredHIMPC
 from himpc.limits import Limits, in_force
-from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import least_rates
+from himpc.limits.limits import Avoidance
 from himpc.qp import solve_qp
 from himpc.references import Hold
-from himpc.references.observed import Observed
-from himpc.references.outlook import Outlook
+from himpc.references.outlook import Observed, Outlook
 from himpc.stack import Level
 from himpc.tasks import FramePosition, Posture
 from himpc.tick.distances import Distances

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from himpc.compilation.compiled import plain
 from himpc.limits import POSITION, TORQUE, VELOCITY, Limits, LimitsInForce, build_rows, in_force, ramp
-from himpc.limits.braking import least_slack
 from himpc.limits.limits import POSITION_MARGIN
-from himpc.limits.viability import RETURN_RATE, viability_bounds
-from himpc.prediction.joint import JointState
+from himpc.limits.rest import least_slack
+from himpc.limits.velocity import RETURN_RATE, viability_bounds
+from himpc.prediction import JointState
 from himpc.tick.kernel.windup import taken_back
 from robots import InputError, load_robot
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from himpc.missions import Follow, Go, MissionTask, Progress, advanced, insert, move, release, remove, reorder
-from himpc.references import Hold, Law, Path, SquareWave, Started, segment
+from himpc.references import Hold, Law, Path, SquareWave, Started
 from robots import InputError
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def test_the_velocity_of_a_path_is_that_of_its_motion(path: Path, part: float) -
 
 def test_a_quintic_segment_starts_and_ends_softly() -> None:
     """Velocity and acceleration are zero at both ends, and the speed in the middle is the cruise speed."""
-    path = segment(np.zeros(2), np.array([3.0, 4.0]), cruise=0.5)
+    path = Path(np.array([[0.0, 0.0], [3.0, 4.0]]), 0.5)
     for t in (0.0, path.duration):
         preview = path.preview(t, 0.1, 0)
         np.testing.assert_allclose(preview.velocity, 0.0, atol=1e-9)
@@ -76,7 +76,7 @@ def test_a_quintic_segment_starts_and_ends_softly() -> None:
 
 def test_a_straight_path_takes_length_over_speed() -> None:
     """5 m at 0.5 m/s take 10 s, and corners need no additional time."""
-    assert segment(np.zeros(2), np.array([3.0, 4.0]), 0.5, "straight").duration == pytest.approx(10.0)
+    assert Path(np.array([[0.0, 0.0], [3.0, 4.0]]), 0.5, "straight").duration == pytest.approx(10.0)
     bent = Path(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]]), 0.5, "straight")
     assert bent.duration == pytest.approx(6.0)
     np.testing.assert_allclose(bent.preview(3.0, 0.1, 0).value, [1.0, 0.5])
@@ -116,7 +116,7 @@ def test_a_square_wave_switches_on_time_and_is_seen_coming() -> None:
 
 
 def test_a_started_reference_has_its_own_clock() -> None:
-    path = segment(np.zeros(1), np.ones(1), 0.5)
+    path = Path(np.array([[0.0], [1.0]]), 0.5)
     np.testing.assert_array_equal(
         Started(path, 3.0).preview(4.0, 0.1, 5).displacement, path.preview(1.0, 0.1, 5).displacement
     )

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from himpc.htmpc.base import base_joints
 from himpc.htmpc.kinematics import frame_at, placed
 from himpc.htmpc.safety import plausible
+from himpc.htmpc.settings import base_joints
 from himpc.kinematics.configuration import Configuration, joint_indices
 from himpc.kinematics.geometry import geometry
 from robots import Robot, load_robot

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from problems import level_problem
 
-from himpc.prediction.joint import JointState
-from himpc.prediction.task import residual_model
+from himpc.prediction import JointState, residual_model
 from himpc.printed import predict
 
 Array = NDArray[np.float64]

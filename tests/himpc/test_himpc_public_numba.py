@@ -20,7 +20,7 @@ NO_PRIVATE = """
 import runpy, sys
 sys.argv[:] = sys.argv[1:]
 runpy.run_path(sys.argv[0], run_name="__main__")
-ours = ("private", "private_views", "pieces", "keeping", "loading")
+ours = ("private", "private_views", "pieces", "keeping")
 print(*(name for name in ours if f"himpc.compilation.{name}" in sys.modules))
 """
 

@@ -18,7 +18,7 @@ from himpc.kinematics.configuration import Configuration
 from himpc.limits import build_rows, in_force
 from himpc.missions import Mission
 from himpc.plan import Plan, write_plan
-from himpc.prediction.joint import JointState
+from himpc.prediction import JointState
 from himpc.printed import cascade
 from himpc.references import Circle, Hold, Phase, previews
 from himpc.telemetry import layout_of

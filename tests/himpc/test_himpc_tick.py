@@ -54,7 +54,7 @@ def random_tree(seed: int) -> Robot:
     links = [f'<link name="l{k}">{INERTIAL if k else ""}</link>' for k in range(n + 1)]
     parts = (*links, '<link name="tip"/>', *(joint(k) for k in range(1, n + 1)), fixed)
     text = f'<robot name="tree">{"".join(parts)}</robot>'
-    return import_robot(text.encode(), f"tree {seed}").used().with_tip("tip")
+    return import_robot(text.encode(), f"tree {seed}", tip="tip").used()
 
 
 def _text(numbers: Array) -> str:

@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from himpc.limits import TORQUE, TORQUE_RATE, VELOCITY, Rows
-from himpc.limits.braking import braking, least_slack
 from himpc.limits.constraint import Constraint, Directions
+from himpc.limits.rest import braking, groups, least_slack
 from himpc.limits.rows import profiles
 from himpc.limits.velocity import summed_twice
-from himpc.limits.yielding import groups
 
 Array = NDArray[np.float64]
 

@@ -10,18 +10,19 @@ import pytest
 from htmpc_problems import FREE, at_home, mobile_settings, mobile_stack, point, previews
 
 from himpc import FrameOrientation, FramePosition, Level
-from himpc.htmpc import HTMPC, G, MotionLimits, base_joints, bounds
+from himpc.htmpc import HTMPC, MotionLimits, base_joints, bounds
 from himpc.htmpc.active_set import ActiveSetSolver
 from himpc.htmpc.clearance import Avoidance, CollisionModel
-from himpc.htmpc.continuing import braking, shifted
 from himpc.htmpc.cost import MU, ZETA, Effort, barrier, barrier_value
 from himpc.htmpc.kernel.kinds import KINDS, LEXICOGRAPHIC
 from himpc.htmpc.kinematics import Knots, desired_values
 from himpc.htmpc.prediction import (
     Motion,
     Start,
+    braking,
     integrator,
     positions,
+    shifted,
     underway,
     velocities,
 )
@@ -85,10 +86,7 @@ def slopes(at: Iterate, level: Tracking) -> Array:
 # ------------------------------------------------------------------ prediction
 
 
-def test_G_is_the_identity_and_a_unicycle_is_refused(robot: Robot) -> None:
-    np.testing.assert_array_equal(G(robot, robot.home), np.eye(9))
-    with pytest.raises(InputError, match="G = I"):
-        G(robot, robot.home, "unicycle")
+def test_a_unicycle_is_refused() -> None:
     with pytest.raises(InputError, match="two prismatic joints"):
         mobile_settings(base="unicycle")
 

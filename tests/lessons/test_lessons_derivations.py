@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from docs.further.how_far_ahead import effects, first_left
 from himpc.limits import Limits, in_force
 from himpc.limits.limits import POSITION_MARGIN
-from himpc.limits.velocity import REACTION
-from himpc.limits.viability import viability_bounds
-from himpc.prediction.task import residual_model
+from himpc.limits.velocity import REACTION, viability_bounds
+from himpc.prediction import residual_model
 from lessons.course import load_lesson
 from lessons.events import MoveTarget
 from lessons.recording.run import run

@@ -11,7 +11,7 @@ from broken_solver import break_kernel, break_solver
 from numpy.typing import NDArray
 
 from himpc.limits import Rows
-from himpc.limits.braking import least_slack
+from himpc.limits.rest import least_slack
 from himpc.tick import tick
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession

@@ -22,7 +22,7 @@ from himpc.tasks import (
     RelativeOrientation,
     RelativePosition,
 )
-from himpc.tasks.frame import FrameTask
+from himpc.tasks.axes import FrameTask
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import as_torque_scene, torque_scene
 from lessons.scenes.run_spec import AS_PRINTED, RunSpec

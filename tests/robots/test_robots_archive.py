@@ -9,6 +9,7 @@ import pickle
 import stat
 import time
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -68,7 +69,7 @@ def test_a_folder_and_a_zip_bring_the_meshes_along(here: Path, kind: str) -> Non
         )
     assert robot.n == 2
     assert not list((here / "temporary").iterdir())
-    for each in (robot, pickle.loads(pickle.dumps(robot)), robot.with_tip("l1")):
+    for each in (robot, pickle.loads(pickle.dumps(robot)), replace(robot, tip="l1")):
         assert {len(shape.faces) for shape in link_shapes(each) if shape.name == "l2/0"} == {80}
     assert "not found" not in str(robot.report.findings)
     assert "temporary" not in robot.urdf_text

@@ -145,7 +145,7 @@ def set_limits(p: LoopArrays, values: Array, n: int) -> int:
 @inline_kernel
 def write_rows(t: TickArrays, p: LoopArrays, first: int, last: int) -> None:
     """Writes √Q, the effect coefficients and the coefficients of the free motion of some rows. They depend on
-    the gains, on Q, and on the share of Q that is in force; see `himpc.prediction.task.residual_model`."""
+    the gains, on Q, and on the share of Q that is in force; see `himpc.prediction.residual_model`."""
     N, T_s = len(t.fixed), t.scalars[T_S]
     for i in range(first, last):
         K, K_p, K_v = t.row_knots[i], t.K_p[i], t.K_v[i]

@@ -1,4 +1,4 @@
-"""Increments of a fallback where rows of distances are violated: `himpc.limits.apart` on arrays."""
+"""Increments of a fallback where rows of distances are violated: `himpc.limits.rest` on arrays."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from himpc.compilation.compiled import inline_kernel, plain
 from himpc.export.kernel.rows import constraints_of, joint_rows
 from himpc.htmpc.kernel.active_set import solve as solve_qp
-from himpc.limits.apart import FAINT
+from himpc.limits.rest import FAINT
 from himpc.tick.kernel.arrays import Array, TickArrays
 from himpc.tick.kernel.bounds import constraint_values
 from himpc.tick.kernel.pair_arrays import PairArrays
@@ -17,7 +17,7 @@ _solve = inline_kernel(plain(solve_qp))
 
 @inline_kernel
 def keep_apart(t: TickArrays, d: PairArrays, U: Array) -> None:
-    """Changes the first increment of U, (N, n) N·m, as `himpc.limits.apart.kept_apart` does: the violation of
+    """Changes the first increment of U, (N, n) N·m, as `himpc.limits.rest.kept_apart` does: the violation of
     the rows of distances is minimised by least squares, and rows of joints that U satisfies stay
     satisfied."""
     N, n, R, joints = len(U), U.shape[1], d.chosen.size, joint_rows(t)

@@ -1,5 +1,5 @@
 """Relaxed bounds, and increments that bring the joints to rest, for each joint separately. The formulas are
-those of `himpc.limits.braking`."""
+those of `himpc.limits.rest`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from himpc.compilation.compiled import inline_kernel
 from himpc.export.kernel.apart import keep_apart
 from himpc.export.kernel.loop_arrays import LoopArrays
 from himpc.export.kernel.rows import constraints_of, joint_rows
+from himpc.limits.rest import MET
 from himpc.limits.rows import BRAKING
-from himpc.limits.yielding import MET
 from himpc.tick.kernel.arrays import PERIOD, T_S, Array, TickArrays
 from himpc.tick.kernel.bounds import constraint_values
 from himpc.tick.kernel.pair_arrays import PairArrays

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.compilation.compiled import FIXED, GIVEN_MATRIX, MATRICES, MATRIX, NUMBER, VECTOR, kernel
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 
 @kernel(

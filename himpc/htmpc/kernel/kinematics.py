@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, TABLE, VECTOR, kernel
 from himpc.compilation.views import borrowed
 from himpc.tick.kernel.kinematics import jacobian, points, rotation_of_frame
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from robots.arrays import Array, Indices
 
 
 @kernel(

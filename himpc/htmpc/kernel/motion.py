@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.compilation.compiled import GIVEN_VECTOR, MATRIX, NUMBER, kernel
-
-Array = NDArray[np.float64]
+from robots.arrays import Array
 
 _NO_JERK_BOUND = 1e9
 """Replaces an infinite jerk bound: infinity times a speed of zero would be NaN."""

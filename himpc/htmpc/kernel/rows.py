@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from himpc.compilation.compiled import (
     FIXED,
     FIXED_VECTOR,
@@ -25,8 +22,7 @@ from himpc.compilation.compiled import (
 from himpc.compilation.views import borrowed
 from himpc.htmpc.kernel.kinds import ACCELERATION, JERK, LEXICOGRAPHIC, POSITION, RAMP, STOP, VELOCITY
 from himpc.tick.kernel.linear import dot
-
-Array = NDArray[np.float64]
+from robots.arrays import Array, Indices, Integers
 
 RAMP_STEPS = 10
 """Largest number of knots beyond the horizon within which the input returns to zero."""
@@ -35,7 +31,7 @@ STOP_STEPS = 40
 
 
 @kernel(MATRIX, WHOLE, INDICES, MATRIX, FIXED)
-def spread(A: Array, index: int, knot: NDArray[np.intp], slopes: Array, T_q: Array) -> None:
+def spread(A: Array, index: int, knot: Indices, slopes: Array, T_q: Array) -> None:
     """Writes rows of functions of q to A (…, N·n), from `index` on. `slopes` (r, n) are the derivatives of
     the functions with respect to q at the knots (r,)."""
     n = slopes.shape[1]
@@ -65,7 +61,7 @@ def guard(
     index: int,
     A: Array,
     room: Array,
-    labels: NDArray[np.int64],
+    labels: Integers,
 ) -> None:
     """Writes (12), |e + J T_q d| ≤ |e*| in every coordinate and knot, to a table from row `index` on.
 
@@ -111,7 +107,7 @@ def limits(
     dt: float,
     A: Array,
     bounds: Array,
-    labels: NDArray[np.int64],
+    labels: Integers,
 ) -> int:
     """Writes the rows of `limit_rows` to the beginning of a table; returns their number."""
     N, n = len(t), len(q)

@@ -8,24 +8,22 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.formulation.forms import StackForm, measure, stack_form
 from himpc.kinematics.configuration import Configuration
 from himpc.references import Preview
-from himpc.references.hold import still
+from himpc.references.curves import still
 from lessons.experiments.jobs import Job, JobResult, Results, Work
 from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET, step_seconds
 from lessons.papers.himpc_paper.planar import RT1
-from lessons.papers.item import Item, PaperCheck, Section, Table
+from lessons.papers.item import PaperCheck, Section, Table
+from lessons.papers.texts import described
 from lessons.papers.words import number, stated, trouble
 from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.scenes.run_spec import RunSpec
 from robots import Plant
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array
 
 _LOST = 0.5
 """m or rad: an error above this counts as loss of control."""
@@ -353,12 +351,4 @@ def _section(results: Results, quick: bool) -> Section:
     )
 
 
-ITEMS = (
-    Item(
-        "himpc-ablations",
-        "What the text argues without numbers",
-        "HIMPC (T-RO 2024), Remarks 5, 6, 8 and section IV-C",
-        _jobs,
-        _section,
-    ),
-)
+ITEMS = (described("himpc-ablations", _jobs, _section),)

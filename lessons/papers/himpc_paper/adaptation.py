@@ -9,7 +9,8 @@ from typing import NamedTuple
 from lessons.experiments.eigenvalues import EigenvalueJob
 from lessons.experiments.jobs import Results
 from lessons.papers.himpc_paper.iiwa import RT4_DATA_SHEET
-from lessons.papers.item import Item, Section
+from lessons.papers.item import Section
+from lessons.papers.texts import described
 from lessons.papers.words import trouble, unprinted
 from lessons.scenes.run_spec import RunSpec
 
@@ -94,6 +95,4 @@ def _section(results: Results, quick: bool) -> Section:
     return Section(rows=tuple(rows))
 
 
-ITEMS = (
-    Item("himpc-adaptation", "M̄ that adapts to the payload", "not in the paper; Remark 4", _jobs, _section),
-)
+ITEMS = (described("himpc-adaptation", _jobs, _section),)

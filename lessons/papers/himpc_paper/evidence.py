@@ -10,10 +10,9 @@ import numpy as np
 from himpc.kinematics.configuration import Configuration
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.iiwa import RT4, rt4
-from lessons.papers.himpc_paper.iiwa import SOURCE as SECTION_VI
 from lessons.papers.himpc_paper.planar import ENCODER, RT1, level_1, roughness, rt1, rt2, rt3
-from lessons.papers.himpc_paper.planar import SOURCE as SECTION_V
-from lessons.papers.item import Item, Row, Section
+from lessons.papers.item import Row, Section
+from lessons.papers.texts import described
 from lessons.papers.words import number, printed, trouble, unprinted
 from lessons.plots.style import name
 from lessons.scenes.catalog import prepared, torque_scene
@@ -122,7 +121,6 @@ def _weights(results: Results, quick: bool) -> Section:
     scenes = (("RT1", RT1), ("RT4", RT4))
     ratio, radius = "Q over R for level 1's weakest direction", "spectral radius of I − M⁻¹M̄"
     return Section(
-        notes=("Computed from the scenes' settings, without a run.",),
         rows=tuple(
             unprinted(f"{words}: {what} at the start", "1", of(scene))
             for what, of in ((ratio, weakest), (radius, _radius))
@@ -246,20 +244,13 @@ def _rivals(results: Results, quick: bool) -> Section:
         ("OSF on RT4: control is lost at", "s", _lost(results[rt4("osf")])),
     )
     return Section(
-        notes=("Unstable: the run loses control (a speed of more than 20 times its limit).",),
         rows=(*rows, *starmap(unprinted, own)),
     )
 
 
 ITEMS = (
-    Item("himpc-conflict", "When tasks conflict, and how", f"{SECTION_V}-C", _conflict_jobs, _conflict),
-    Item("himpc-rivals", "RT4 without HIMPC", f"{SECTION_VI}-B", lambda _: tuple(map(rt4, _RIVALS)), _rivals),
-    Item(
-        "himpc-weights",
-        "How R compares with Q, and M̄ with M",
-        f"{SECTION_V}-A, {SECTION_VI}-A",
-        lambda _: (),
-        _weights,
-    ),
-    Item("himpc-settings", "What other settings change", f"{SECTION_V}-B", _settings_jobs, _settings),
+    described("himpc-conflict", _conflict_jobs, _conflict),
+    described("himpc-rivals", tuple(map(rt4, _RIVALS)), _rivals),
+    described("himpc-weights", (), _weights),
+    described("himpc-settings", _settings_jobs, _settings),
 )

@@ -8,9 +8,8 @@ import numpy as np
 
 from himpc.telemetry import AT_POSITION
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.curves import banded, by_controller, curve, drawn, excerpt, spans
+from lessons.papers.curves import banded, by_controller, curve, excerpt, spans
 from lessons.papers.himpc_paper.iiwa import (
-    SOURCE,
     horizon_job,
     horizons,
     resolution_job,
@@ -19,9 +18,10 @@ from lessons.papers.himpc_paper.iiwa import (
     step_seconds,
     timed,
 )
-from lessons.papers.item import Item, Section, Table
+from lessons.papers.item import Section, Table
+from lessons.papers.texts import described, drawn
 from lessons.papers.words import number, printed, trouble
-from lessons.plots.panels import Bars, Panel, Picture
+from lessons.plots.panels import Bars, Panel
 
 DEG = 180 / np.pi
 
@@ -46,8 +46,7 @@ def _fig_17(results: Results, quick: bool) -> Section:
             ("q1", "error of level 3 (deg)", ("$q_1$",), DEG, 6),
         )
     )
-    caption = "Tracking errors of HIMPC on RT4, N = 5. Shaded: a position limit is active."
-    return drawn("himpc-fig-17", caption, panels)
+    return drawn("himpc-fig-17", panels)
 
 
 def _fig_18_jobs(quick: bool) -> tuple[Job, ...]:
@@ -59,8 +58,7 @@ def _fig_18(results: Results, quick: bool) -> Section:
         curve(results[job], "error/position", 0, 1e3, label=f"N = {N}", colour=str(k))
         for k, (job, N) in enumerate(zip(_fig_18_jobs(quick), horizons("himpc", quick), strict=True))
     )
-    caption = "Error of x on RT4 against the horizon N, HIMPC."
-    return drawn("himpc-fig-18", caption, (Panel("$e_x$ (mm)", curves),))
+    return drawn("himpc-fig-18", (Panel("$e_x$ (mm)", curves),))
 
 
 def _fig_19_horizons(quick: bool) -> tuple[int, ...]:
@@ -81,8 +79,7 @@ def _fig_19(results: Results, quick: bool) -> Section:
         runs = [results[horizon_job(controller, N, (), quick)] for controller in ("himpc", "nhimpc")]
         curves = by_controller(runs, "error/position", 0, 1e3)
         panels.append(Panel("$e_x$ (mm)", curves, title=f"N = {N}"))
-    caption = "Error of x on RT4, Jacobians along the last plan (HIMPC) and along the current one (NHIMPC)."
-    return drawn("himpc-fig-19", caption, panels)
+    return drawn("himpc-fig-19", panels)
 
 
 def _fig_20_horizons(quick: bool) -> tuple[int, ...]:
@@ -97,15 +94,7 @@ def _fig_20(results: Results, quick: bool) -> Section:
     rows = tuple(
         (str(N), number(value), trouble(run)) for N, value, run in zip(Ns, average, runs, strict=True)
     )
-    note = (
-        "The paper shows bars without numbers; they grow exponentially with N (8.05 ms at N = 5, Table "
-        "VII). Here the time for bases and bounds is proportional to N, that for the least squares to N³."
-    )
-    return Section(
-        notes=(note,),
-        tables=(Table("Average step time (ms)", ("N", "ours", ""), rows),),
-        pictures=(Picture("himpc-fig-20", "Average computing time of HIMPC per step on RT4.", (bars,)),),
-    )
+    return drawn("himpc-fig-20", (bars,), tables=(Table("Average step time (ms)", ("N", "ours", ""), rows),))
 
 
 def _fig_21_jobs(quick: bool) -> tuple[Job, ...]:
@@ -125,20 +114,18 @@ def _fig_21(results: Results, quick: bool) -> Section:
         replace(banded(whole), title="least and largest value in every 50 ms"),
         replace(excerpt(whole, 1.0, 1.05), title="an excerpt of 50 ms"),
     )
-    caption = f"Torque of joint 1 with encoders of 5e-3°: S = {number(smoothness(coarse, benchmark))} N·m."
-    return drawn("himpc-fig-21", caption, panels, 2)
+    S = number(smoothness(coarse, benchmark))
+    return drawn("himpc-fig-21", panels, 2, {"S": S})
 
 
 ITEMS = (
-    Item("himpc-fig-17", "Errors on three levels", f"{SOURCE}-B, Fig. 17", lambda quick: (rt4(),), _fig_17),
-    Item("himpc-fig-18", "Error of x over the horizon", f"{SOURCE}-C, Fig. 18", _fig_18_jobs, _fig_18),
-    Item("himpc-fig-19", "HIMPC and NHIMPC", f"{SOURCE}-C, Fig. 19", _fig_19_jobs, _fig_19),
-    Item(
+    described("himpc-fig-17", (rt4(),), _fig_17),
+    described("himpc-fig-18", _fig_18_jobs, _fig_18),
+    described("himpc-fig-19", _fig_19_jobs, _fig_19),
+    described(
         "himpc-fig-20",
-        "Computing time over the horizon",
-        f"{SOURCE}-C, Fig. 20",
         lambda quick: tuple(timed("himpc", N, quick) for N in _fig_20_horizons(quick)),
         _fig_20,
     ),
-    Item("himpc-fig-21", "Chatter with coarse encoders", f"{SOURCE}-D, Fig. 21", _fig_21_jobs, _fig_21),
+    described("himpc-fig-21", _fig_21_jobs, _fig_21),
 )

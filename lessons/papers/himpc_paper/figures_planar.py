@@ -6,28 +6,27 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
-from numpy.typing import NDArray
 
+from lessons.experiments.drag import skeleton
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.curves import (
     PLANAR_ERRORS,
     banded,
     curve,
-    drawn,
     error_panels,
     excerpt,
     joint_panels,
     log_error_panels,
 )
-from lessons.papers.himpc_paper.planar import COMPARED, ENCODER, SOURCE, level_1, roughness, rt1, rt2, rt3
-from lessons.papers.item import Row, Section, Table, figures
+from lessons.papers.himpc_paper.planar import COMPARED, ENCODER, level_1, roughness, rt1, rt2, rt3
+from lessons.papers.item import Row, Section, Table
+from lessons.papers.texts import described, drawn
 from lessons.papers.words import number, stated, trouble, unprinted
-from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
+from lessons.plots.panels import Bars, Panel, PlotCurve
 from lessons.plots.style import name
-from robots import Robot, load_robot
+from robots import load_robot
+from robots.arrays import Array
 
-Array = NDArray[np.float64]
 DEG = 180 / np.pi
 INCREMENTAL = ("tdeosf", "hiqp", "himpc")
 CONFLICT = (rt2("hqp"), rt2("himpc"))
@@ -77,17 +76,14 @@ def _fig_3(results: Results, quick: bool) -> Section:
             ),
         ),
     )
-    note = "The paper's axes have no readable scale: centre, radius, time law and swings of q₁ are ours."
-    caption = "RT1 and RT2: the EE's circle and the two references of q₁."
-    return replace(drawn("himpc-fig-3", caption, panels, 3), notes=(note,))
+    return drawn("himpc-fig-3", panels, 3)
 
 
 def _fig_9(results: Results, quick: bool) -> Section:
     run = results[rt3("himpc")]
     axes = (_reference(run, "position", 0, "$x_d$", "0"), _reference(run, "position", 1, "$y_d$", "1"))
     panels = (_path(run), Panel("position (m)", axes))
-    caption = "RT3: two tangent circles; the arm is straight at 0 s, 8 s and 16 s."
-    return drawn("himpc-fig-9", caption, panels, 2)
+    return drawn("himpc-fig-9", panels, 2)
 
 
 # ------------------------------------------------------------------------ Figs. 4 to 8: scenario 1
@@ -95,26 +91,17 @@ def _fig_9(results: Results, quick: bool) -> Section:
 
 def _fig_4(results: Results, quick: bool) -> Section:
     runs = _runs(results, encoder_runs(COMPARED))
-    caption = (
-        "Size of the tracking errors on RT1 with the paper's encoder, the largest in every 50 ms. OSF and "
-        "HQP coincide, and so do TDEOSF and HIMPC. Curves are cut off below 1e-4."
-    )
-    return drawn("himpc-fig-4", caption, log_error_panels(runs, PLANAR_ERRORS))
+    return drawn("himpc-fig-4", log_error_panels(runs, PLANAR_ERRORS))
 
 
 def _fig_5(results: Results, quick: bool) -> Section:
     runs = _runs(results, encoder_runs(INCREMENTAL))
-    caption = "Tracking errors of the methods with time-delay estimation on RT1, paper's encoder."
-    return drawn("himpc-fig-5", caption, error_panels(runs, PLANAR_ERRORS))
+    return drawn("himpc-fig-5", error_panels(runs, PLANAR_ERRORS))
 
 
 def _torques(results: Results, number: int, controllers: tuple[str, str]) -> Section:
     runs = _runs(results, encoder_runs(controllers))
     first, second = (name(controller) for controller in controllers)
-    caption = (
-        f"Torques of {first} and {second} on RT1 with the paper's encoder: the least and the largest value "
-        "in every 50 ms, which are nearly the same for both; right: an excerpt of 50 ms."
-    )
     whole = joint_panels(runs, "tau", r"\tau", "N·m")
     panels = tuple(part for panel in whole for part in (banded(panel), excerpt(panel, 2.5, 2.55)))
     row = stated(
@@ -124,7 +111,7 @@ def _torques(results: Results, number: int, controllers: tuple[str, str]) -> Sec
         "{says} 1 (smoother)",
         "smoothness",
     )
-    return drawn(f"himpc-fig-{number}", caption, panels, 2, rows=(row,))
+    return drawn(f"himpc-fig-{number}", panels, 2, rows=(row,))
 
 
 def _fig_8(results: Results, quick: bool) -> Section:
@@ -164,14 +151,12 @@ def _fig_8(results: Results, quick: bool) -> Section:
             "average-cost",
         ),
     )
-    return Section(
-        notes=(
-            "The cost (41), with e from measurements that are differentiated numerically. With an encoder, e "
-            "is mostly noise, which is nearly the same for all controllers.",
-        ),
+    return drawn(
+        "himpc-fig-8",
+        (bars, relative),
+        2,
         rows=compared,
         tables=(Table("Average cost (41)", ("controller", "level 1", "level 2", ""), rows),),
-        pictures=(Picture("himpc-fig-8", "Average cost (41) on RT1, paper's encoder.", (bars, relative), 2),),
     )
 
 
@@ -188,8 +173,7 @@ def _fig_7(results: Results, quick: bool) -> Section:
 
 def _fig_10(results: Results, quick: bool) -> Section:
     runs = _runs(results, CONFLICT)
-    caption = "Tracking errors on RT2. While the tasks conflict, level 2 gives way."
-    return drawn("himpc-fig-10", caption, error_panels(runs, PLANAR_ERRORS))
+    return drawn("himpc-fig-10", error_panels(runs, PLANAR_ERRORS))
 
 
 def _fig_11(results: Results, quick: bool) -> Section:
@@ -206,9 +190,8 @@ def _fig_11(results: Results, quick: bool) -> Section:
             title = f"{name(controller)}, {words}" if k == 0 else ""
             panels.append(Panel(f"$e_{axis}$ (mm)", curves, title=title, y_range=(-size, size)))
         growth[controller] = level_1(conflict) / level_1(circle)
-    caption = "Level-1 errors with (RT2) and without (RT1) conflict. HIMPC's axes are enlarged tenfold."
     ordered = (panels[0], panels[2], panels[1], panels[3])
-    return drawn("himpc-fig-11", caption, ordered, 2, rows=_growth_rows(results, growth))
+    return drawn("himpc-fig-11", ordered, 2, rows=_growth_rows(results, growth))
 
 
 def _growth_rows(results: Results, growth: dict[str, float]) -> tuple[Row, ...]:
@@ -239,26 +222,18 @@ _CHATTER = (0.5, 1.6)
 def _fig_12(results: Results, quick: bool) -> Section:
     runs = _runs(results, CONFLICT)
     panels = joint_panels(runs, "tau_demand", r"\tau", "N·m", bound="tau_upper", weights=_CHATTER)
-    return drawn("himpc-fig-12", "Torque demands on RT2, with their bounds.", panels)
+    return drawn("himpc-fig-12", panels)
 
 
 def _fig_13(results: Results, quick: bool) -> Section:
     runs = _runs(results, CONFLICT)
     panels = joint_panels(runs, "v", r"\dot q", "deg/s", DEG, bound="v_limit", weights=_CHATTER)
-    return drawn("himpc-fig-13", "Joint velocities on RT2, with their bounds.", panels)
+    return drawn("himpc-fig-13", panels)
 
 
 # ------------------------------------------------------------------------ Figs. 14 and 15: singularity
 
 POSES = 19
-
-
-def skeleton(robot: Robot, q: Array) -> Array:
-    """Joint origins and tip in the world, (n + 1, 3) m."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    joints = [data.oMi[joint].translation for joint in range(1, robot.model.njoints)]
-    return np.array([*joints, data.oMf[robot.frame_id(robot.tip)].translation])
 
 
 def _time_beside(tip: Array, path: Array, t: float) -> tuple[float, float, str]:
@@ -292,8 +267,7 @@ def _fig_14(results: Results, quick: bool) -> Section:
             # The last pose of a panel has no label; the second panel labels that of the first.
             notes = tuple(_time_beside(points[-1], x_d, float(run.t[tick])) for tick, points in chains[:-1])
             panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title, notes=notes))
-    caption = f"HIMPC on RT3 in {POSES} poses; straight and singular in the 1st, 10th and 19th (thick)."
-    return drawn("himpc-fig-14", caption, panels or (Panel("y (m)", ()),), 2)
+    return drawn("himpc-fig-14", panels or (Panel("y (m)", ()),), 2, {"poses": POSES})
 
 
 def _fig_15(results: Results, quick: bool) -> Section:
@@ -308,33 +282,21 @@ def _fig_15(results: Results, quick: bool) -> Section:
         unprinted(f"HIMPC, {axis}: RMSE over the whole run", "m", x, why)
         for axis, x in zip("xy", whole, strict=True)
     )
-    return drawn("himpc-fig-15", "Tracking errors of HIMPC on RT3.", panels, rows=tuple(rows))
+    return drawn("himpc-fig-15", panels, rows=tuple(rows))
 
 
-ITEMS = figures(
-    (3, "RT1 and RT2", f"{SOURCE}-B, Fig. 3", (rt1("himpc"), rt2("himpc")), _fig_3),
-    (4, "Errors, four controllers", f"{SOURCE}-B, Fig. 4", encoder_runs(COMPARED), _fig_4),
-    (5, "Errors with TDE", f"{SOURCE}-B, Fig. 5", encoder_runs(INCREMENTAL), _fig_5),
-    (6, "Torques of TDEOSF and HIMPC", f"{SOURCE}-B, Fig. 6", encoder_runs(("tdeosf", "himpc")), _fig_6),
-    (7, "Torques of HIQP and HIMPC", f"{SOURCE}-B, Fig. 7", encoder_runs(("hiqp", "himpc")), _fig_7),
-    (
-        8,
-        "Average cost",
-        f"{SOURCE}-B, Fig. 8 and (41)",
-        encoder_runs(("himpc", "tdeosf", "hiqp")),
-        _fig_8,
-    ),
-    (9, "RT3", f"{SOURCE}-C, Fig. 9", (rt3("himpc"),), _fig_9),
-    (10, "Errors under conflict", f"{SOURCE}-C, Fig. 10", CONFLICT, _fig_10),
-    (
-        11,
-        "Level 1 with and without conflict",
-        f"{SOURCE}-C, Fig. 11",
-        (rt1("hqp"), rt1("himpc"), *CONFLICT),
-        _fig_11,
-    ),
-    (12, "Torques under conflict", f"{SOURCE}-C, Fig. 12", CONFLICT, _fig_12),
-    (13, "Velocities under conflict", f"{SOURCE}-C, Fig. 13", CONFLICT, _fig_13),
-    (14, "Through the singularity, poses", f"{SOURCE}-C, Fig. 14", (rt3("himpc"),), _fig_14),
-    (15, "Through the singularity, errors", f"{SOURCE}-C, Fig. 15", (rt3("himpc"),), _fig_15),
+ITEMS = (
+    described("himpc-fig-3", (rt1("himpc"), rt2("himpc")), _fig_3),
+    described("himpc-fig-4", encoder_runs(COMPARED), _fig_4),
+    described("himpc-fig-5", encoder_runs(INCREMENTAL), _fig_5),
+    described("himpc-fig-6", encoder_runs(("tdeosf", "himpc")), _fig_6),
+    described("himpc-fig-7", encoder_runs(("hiqp", "himpc")), _fig_7),
+    described("himpc-fig-8", encoder_runs(("himpc", "tdeosf", "hiqp")), _fig_8),
+    described("himpc-fig-9", (rt3("himpc"),), _fig_9),
+    described("himpc-fig-10", CONFLICT, _fig_10),
+    described("himpc-fig-11", (rt1("hqp"), rt1("himpc"), *CONFLICT), _fig_11),
+    described("himpc-fig-12", CONFLICT, _fig_12),
+    described("himpc-fig-13", CONFLICT, _fig_13),
+    described("himpc-fig-14", (rt3("himpc"),), _fig_14),
+    described("himpc-fig-15", (rt3("himpc"),), _fig_15),
 )

@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 
 from lessons.experiments.jobs import Job, JobResult, Results
-from lessons.papers.item import Item, PaperCheck, Row, Section, Table, between
+from lessons.papers.item import PaperCheck, Row, Section, Table, between
+from lessons.papers.texts import described
 from lessons.papers.words import gain_rows, number, printed, trouble, unprinted
 from lessons.plots.style import name
 from lessons.scenes.run_spec import RunSpec
 
 RT4, RT4_DATA_SHEET = "iiwa14-circle-paper", "iiwa14-circle"
-SOURCE = "HIMPC (T-RO 2024), section VI"
 DISTURBED = "[0.8,0.8,1.2,1.2,0.8,1.2,1.2]"
 """Section VI-B: each diagonal element reduced or increased by 20 %, in the order − − + + − + +."""
 _LEVELS = (
@@ -387,7 +387,6 @@ def _table_7(results: Results, quick: bool) -> Section:
         ),
     )
     return Section(
-        notes=("Step times from state in to torque out, N = 5, while no other job of ours runs.",),
         rows=tuple(rows),
         tables=(table,),
         checks=(
@@ -468,26 +467,15 @@ def _table_8(results: Results, quick: bool) -> Section:
 
 
 ITEMS = (
-    Item(
-        "himpc-table-4",
-        "Gains of the iiwa's tasks",
-        f"{SOURCE}-A, Table IV",
-        lambda quick: (),
-        lambda results, quick: Section(
-            notes=("The gains that the scene uses, read from it.",),
-            rows=gain_rows(RT4, printed("himpc_table_4")),
-        ),
+    described(
+        "himpc-table-4", (), lambda results, quick: Section(rows=gain_rows(RT4, printed("himpc_table_4")))
     ),
-    Item("himpc-table-5", "RMSE, inertia 20 % off", f"{SOURCE}-B, Table V", _table_5_jobs, _table_5),
-    Item("himpc-table-6", "RMSE over the horizon", f"{SOURCE}-C, Table VI", _table_6_jobs, _table_6),
-    Item(
+    described("himpc-table-5", _table_5_jobs, _table_5),
+    described("himpc-table-6", _table_6_jobs, _table_6),
+    described(
         "himpc-table-7",
-        "Computing time with N = 5",
-        f"{SOURCE}-C, Table VII",
         lambda quick: tuple(timed(controller, 5, quick) for controller in ("himpc", "nhimpc")),
         _table_7,
     ),
-    Item(
-        "himpc-table-8", "Smoothness over the resolution", f"{SOURCE}-D, Table VIII", _table_8_jobs, _table_8
-    ),
+    described("himpc-table-8", _table_8_jobs, _table_8),
 )

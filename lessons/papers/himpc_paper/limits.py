@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.iiwa import RT4_DATA_SHEET
-from lessons.papers.item import Item, PaperCheck, Section, Table, at_most, between
+from lessons.papers.item import PaperCheck, Section, Table, at_most, between
+from lessons.papers.texts import described, drawn
 from lessons.papers.words import number, trouble, unprinted
-from lessons.plots.panels import Bars, Picture
+from lessons.plots.panels import Bars
 from lessons.scenes.run_spec import RunSpec
 
 MODES = {
@@ -90,27 +91,20 @@ def _section(results: Results, quick: bool) -> Section:
     )
     printed = results[_job("as printed", "nominal")]
     checks += (between("nominal, as printed: speed over its limit", _over(printed, "velocity"), 1.05, 2.0),)
-    return Section(
-        notes=(
-            "RT4 from rest under the data sheet's limits: the reference is too fast for joint 1, and joints "
-            "come near the ends of their ranges. As printed, speeds exceed their limits and a few QPs have "
-            "no solution. A barrier on speed alone makes this worse: a slow joint cannot obey a position "
-            "row that requires it to turn back within 5 ms. With position limits before which the joint can "
-            "stop, positions keep their limits and every QP has a solution. Speeds keep theirs to 1 %, "
-            "except with an unknown payload of 2 kg: with this payload from the start on, level 1 is lost "
-            "under all three kinds of limits. The constants are settings.",
-        ),
+    return drawn(
+        "himpc-limits",
+        _panels(results, plants),
+        2,
         rows=tuple(rows),
         tables=(Table("Violations, errors and QPs without a solution", columns, lines),),
         checks=checks,
-        pictures=(_picture(results, plants),),
     )
 
 
 _WHY = "the paper prints no number; its Fig. 13 shows slight violations of speed"
 
 
-def _picture(results: Results, plants: list[str]) -> Picture:
+def _panels(results: Results, plants: list[str]) -> tuple[Bars, ...]:
     def bars(label: str, value: Callable[[JobResult], float]) -> Bars:
         series = tuple(
             (mode, str(index), tuple(value(results[_job(mode, plant)]) for plant in plants))
@@ -118,17 +112,12 @@ def _picture(results: Results, plants: list[str]) -> Picture:
         )
         return Bars(label, tuple(plant.replace(" ", "\n", 1) for plant in plants), series)
 
-    panels = (
+    return (
         bars("speed over its limit (%)", lambda run: 100.0 * (_over(run, "velocity") - 1.0)),
         bars("position over its limit (%)", lambda run: 100.0 * (_over(run, "position") - 1.0)),
         bars("QPs without a solution", lambda run: run.figure("solver", "unsolved")),
         bars("level 1, worst axis (mm)", _level_1_mm),
     )
-    caption = (
-        "Limits as printed, with a barrier on speed, and with position limits before which the joint can "
-        "stop. –: none."
-    )
-    return Picture("himpc-limits", caption, panels, 2)
 
 
-ITEMS = (Item("himpc-limits", "What keeps a limit", "HIMPC (T-RO 2024), (32d), (32e)", _jobs, _section),)
+ITEMS = (described("himpc-limits", _jobs, _section),)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lessons.experiments.jobs import Job, JobResult, Results
-from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
+from lessons.papers.item import PaperCheck, Row, Section, Table, at_most, between
+from lessons.papers.texts import described
 from lessons.papers.words import gain_rows, number, printed, trouble, unprinted
 from lessons.plots.style import name
 from lessons.scenes.run_spec import RunSpec
@@ -18,8 +19,6 @@ RT1, RT2, RT3 = "planar3-circle", "planar3-conflict", "planar3-singular"
 COMPARED = ("osf", "tdeosf", "hqp", "himpc")
 ENCODER = ("plant.encoder_resolution_deg=0.00125",)
 """The resolution of the paper's encoders, section V-A."""
-SOURCE = "HIMPC (T-RO 2024), section V"
-
 COORDINATES = (("x", "position", 0, "m"), ("y", "position", 1, "m"), ("q1", "q1", 0, "deg"))
 """(label, task, its coordinate, unit) of the rows of Table II."""
 
@@ -67,10 +66,7 @@ def roughness(run: JobResult) -> float:
 
 
 def _table_1(results: Results, quick: bool) -> Section:
-    return Section(
-        notes=("The gains that the scene uses, read from it.",),
-        rows=gain_rows(RT1, printed("himpc_table_1")),
-    )
+    return Section(rows=gain_rows(RT1, printed("himpc_table_1")))
 
 
 def _table_2_jobs(quick: bool) -> tuple[Job, ...]:
@@ -112,12 +108,6 @@ def _table_2(results: Results, quick: bool) -> Section:
     ]
     noisy = {controller: results[rt1(controller, *ENCODER)] for controller in COMPARED}
     return Section(
-        notes=(
-            "RMSE after the first second of RT1. The paper's numbers are measured on its own arm, whose "
-            "masses, friction and model errors it does not print. Ours are simulated on `planar3` with a "
-            "nominal model that is 20 % too light and contains no friction. Only magnitudes and ratios "
-            "between controllers can be compared.",
-        ),
         rows=tuple(rows),
         tables=(
             _whole_run(results),
@@ -368,9 +358,7 @@ def _conflict_checks(results: Results) -> Sequence[PaperCheck]:
 
 
 ITEMS = (
-    Item("himpc-table-1", "Gains of the planar arm", f"{SOURCE}-A, Table I", lambda quick: (), _table_1),
-    Item("himpc-table-2", "RMSE on RT1, four controllers", f"{SOURCE}-B, Table II", _table_2_jobs, _table_2),
-    Item(
-        "himpc-table-3", "Properties of four controllers", f"{SOURCE}-C, Table III", _table_3_jobs, _table_3
-    ),
+    described("himpc-table-1", (), _table_1),
+    described("himpc-table-2", _table_2_jobs, _table_2),
+    described("himpc-table-3", _table_3_jobs, _table_3),
 )

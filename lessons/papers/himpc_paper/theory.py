@@ -6,20 +6,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.planar import RT1
-from lessons.papers.item import Item, PaperCheck, Section, Table, between
+from lessons.papers.item import PaperCheck, Section, Table, between
+from lessons.papers.texts import described, drawn
 from lessons.papers.words import number, trouble
-from lessons.plots.panels import Panel, Picture, PlotCurve
+from lessons.plots.panels import Panel, PlotCurve
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.scenes.run_spec import RunSpec
 from robots import NominalModel
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array
 
 # ---------------------------------------- section III-B: the errors of the models
 
@@ -119,18 +117,7 @@ def _accuracy(results: Results, quick: bool) -> Section:
     panels = [_panel(r"$T_s$ (ms)", {ms: errors[_at_period(ms)] for ms in PERIODS})]
     if not quick:
         panels.append(_panel(r"factor on $\bar M$", {scale: errors[_at_scale(scale)] for scale in SCALES}))
-    caption = "Errors of the nominal model (20 % too light, no friction) and of the incremental one on RT1."
-    return Section(
-        notes=(
-            "The error of the next acceleration that each model predicts along HIMPC's own motion, from the "
-            "definitions of the errors. The nominal model is 20 % too light and has no friction. On the iiwa "
-            "two things reduce the advantage of the incremental model: bounds that become active and "
-            "inactive change q̈ from tick to tick, and M̄ is far below M.",
-        ),
-        tables=(table,),
-        checks=(check,),
-        pictures=(Picture("himpc-accuracy", caption, tuple(panels), len(panels)),),
-    )
+    return drawn("himpc-accuracy", panels, len(panels), tables=(table,), checks=(check,))
 
 
 def _panel(label: str, errors: dict[float, ModelErrors]) -> Panel:
@@ -194,12 +181,9 @@ def _value_function(results: Results, quick: bool) -> Section:
             y_range=(0.0, 2.0),
         ),
     )
-    caption = (
-        "Value functions of the three levels from rest on RT4, and the ratio of successive values for level "
-        "1. The value of level 3 rises: its reference is faster than joint 1 is allowed to turn, and (39) "
-        "guarantees nothing for lower levels."
-    )
-    return Section(
+    return drawn(
+        "himpc-value",
+        panels,
         notes=(
             "V_N(k) is the optimal cost of each level, from the telemetry. By (39), the cost of level 1 must "
             "decrease as long as it is far above the bound ε_N that the estimation error leaves. The cost of "
@@ -213,7 +197,6 @@ def _value_function(results: Results, quick: bool) -> Section:
                 bool(alpha > 0),
             ),
         ),
-        pictures=(Picture("himpc-value", caption, panels),),
     )
 
 
@@ -222,18 +205,6 @@ def _value(run: JobResult, level: str, index: int) -> PlotCurve:
 
 
 ITEMS = (
-    Item(
-        "himpc-accuracy",
-        "Accuracy of the incremental model",
-        "HIMPC (T-RO 2024), section III-B, (21), (24), (25), (27)",
-        _accuracy_jobs,
-        _accuracy,
-    ),
-    Item(
-        "himpc-value",
-        "The value function of level 1 decreases",
-        "HIMPC (T-RO 2024), section IV-B, (37) to (39)",
-        lambda quick: (_JOB,),
-        _value_function,
-    ),
+    described("himpc-accuracy", _accuracy_jobs, _accuracy),
+    described("himpc-value", (_JOB,), _value_function),
 )

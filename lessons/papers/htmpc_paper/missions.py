@@ -7,17 +7,14 @@ import math
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.htmpc_paper.runs import SOURCE
-from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
+from lessons.papers.item import PaperCheck, Row, Section, Table, at_most, between
+from lessons.papers.texts import described, drawn
 from lessons.papers.words import number, printed, trouble
-from lessons.plots.panels import Panel, Picture, PlotCurve
+from lessons.plots.panels import Panel, PlotCurve
 from lessons.scenes.run_spec import RunSpec
-
-Array = NDArray[np.float64]
-
+from robots.arrays import Array
 
 # ---------------------------------------- Fig. 8: two waypoints
 
@@ -49,13 +46,10 @@ def _waypoints(results: Results, quick: bool) -> Section:
         if len(run.t):
             base = run["x/base"]
             curves.append(PlotCurve(base[:, 0], base[:, 1], words, str(index)))
-    caption = "Base paths. The paper's waypoints are not printed: these are ours."
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
     columns = ("architecture", "way of the base (m)", "time (s)", "mission")
-    return Section(
-        tables=(Table("Two waypoints", columns, tuple(lines)),),
-        pictures=(Picture("htmpc-fig-8", caption, (panel,)),),
-    )
+    table = Table("Two waypoints", columns, tuple(lines))
+    return drawn("htmpc-fig-8", (panel,), tables=(table,))
 
 
 # ---------------------------------------- Fig. 9: delivery rounds
@@ -129,11 +123,12 @@ def _rounds(results: Results, quick: bool) -> Section:
             base = run["x/base"]
             curves.append(PlotCurve(base[:, 0], base[:, 1], architecture, str(index)))
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
-    return Section(
+    return drawn(
+        "htmpc-fig-9",
+        (panel,),
         rows=_ratios(time),
         tables=(Table("Three of six seats, four rounds", columns, lines),),
         checks=tuple(checks),
-        pictures=(Picture("htmpc-fig-9", "Base paths of the first layout.", (panel,)),),
     )
 
 
@@ -177,12 +172,6 @@ def _largest(results: Results, quick: bool, kind: str) -> float:
 
 
 ITEMS = (
-    Item(
-        "htmpc-fig-8",
-        "Base paths, two waypoints",
-        f"{SOURCE}-D, Fig. 8",
-        lambda quick: tuple(_cases().values()),
-        _waypoints,
-    ),
-    Item("htmpc-fig-9", "Delivery rounds", f"{SOURCE}-D, Fig. 9", _rounds_jobs, _rounds),
+    described("htmpc-fig-8", tuple(_cases().values()), _waypoints),
+    described("htmpc-fig-9", _rounds_jobs, _rounds),
 )

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, JobResult
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.missions import random_peaks
+from robots.arrays import Array
 
-Array = NDArray[np.float64]
-
-SOURCE = "HTMPC paper, section V"
 SQUARE = "ridgeback-ur10-square"
 PEAKS_SEED = 0
 EE_HOME = np.array([1.490, 0.174])

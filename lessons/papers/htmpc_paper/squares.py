@@ -8,11 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from lessons.experiments.jobs import Job, JobResult, Results, Work
-from lessons.papers.curves import drawn
 from lessons.papers.htmpc_paper.runs import (
     EE_HOME,
     METHODS,
-    SOURCE,
     Array,
     example,
     hand_mm,
@@ -21,9 +19,10 @@ from lessons.papers.htmpc_paper.runs import (
     peaks,
     square,
 )
-from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
+from lessons.papers.item import PaperCheck, Row, Section, Table, at_most, between
+from lessons.papers.texts import described, drawn
 from lessons.papers.words import number, printed, unprinted
-from lessons.plots.panels import Panel, Picture, PlotCurve
+from lessons.plots.panels import Panel, PlotCurve
 
 BASE_GAINS = (0.3, 0.6, 0.65, 0.7, 0.75)
 """Base gains of HTIDKC, 1/s, that are tried to match HTMPC on Part 1; the first one is the authors' gain."""
@@ -68,9 +67,8 @@ def _fig_3(results: Results, quick: bool) -> Section:
     if len(run.t):
         base = run["x/base"]
         curves.append(PlotCurve(base[:, 0], base[:, 1], "base path of the example", "htmpc"))
-    caption = "Peak targets of the random square waves, all out of reach, and one base path."
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
-    return drawn("htmpc-fig-3", caption, (panel,))
+    return drawn("htmpc-fig-3", (panel,))
 
 
 def _fig_4(results: Results, quick: bool) -> Section:
@@ -96,11 +94,7 @@ def _fig_4(results: Results, quick: bool) -> Section:
         unprinted(f"{words}: mean EE error", "mm", hand_mm(run)[0], "the paper shows curves only")
         for words, run in runs.items()
     )
-    caption = (
-        "The example: base error divided by its value at the start of each part, and EE error, cut off "
-        "below 1e-3. HTMPC (broad) and HTMPC_WPT coincide until HTMPC sees the step at 8 s."
-    )
-    return drawn("htmpc-fig-4", caption, panels, rows=rows)
+    return drawn("htmpc-fig-4", panels, rows=rows)
 
 
 def _fig_6(results: Results, quick: bool) -> Section:
@@ -173,18 +167,8 @@ def _fig_6(results: Results, quick: bool) -> Section:
     panels = tuple(
         _strip(f"Part {k + 1}", {words: parts[k] for words, parts in errors.items()}) for k in (0, 1)
     )
-    notes = (
-        "Base error divided by its value at the start of the part, mean over the part, per square wave. "
-        '"Better": Part 2 against HTIDKC with the authors\' gains.',
-    )
-    caption = "Fitted density, one dot per square wave, and the mean, in the order of the table's methods."
-    return Section(
-        notes,
-        tuple(rows),
-        (Table("All methods", columns, lines),),
-        checks,
-        (Picture("htmpc-fig-6", caption, panels, 2),),
-    )
+    table = Table("All methods", columns, lines)
+    return drawn("htmpc-fig-6", panels, 2, rows=tuple(rows), tables=(table,), checks=checks)
 
 
 def _apart(a: Array, b: Array) -> float:
@@ -245,20 +229,14 @@ def _fig_7(results: Results, quick: bool) -> Section:
         apart = [errors[chosen].mean() if chosen.any() else math.nan for chosen in (on_line, ~on_line)]
         lines.append((words, str(int(on_line.sum())), *(number(float(x)) for x in apart)))
     columns = ("method", "collinear waves", "their Part 2", "Part 2 of the others")
-    caption = "Base error in Part 2 by the position of the peak target, seen from the EE."
-    return Section(
-        tables=(Table("Peak, valley and EE on a line", columns, tuple(lines)),),
-        pictures=(Picture("htmpc-fig-7", caption, tuple(panels), 2),),
-    )
+    table = Table("Peak, valley and EE on a line", columns, tuple(lines))
+    return drawn("htmpc-fig-7", panels, 2, tables=(table,))
 
 
-def _examples(quick: bool) -> tuple[Job, ...]:
-    return tuple(example(controller) for controller in METHODS)
-
-
+_EXAMPLES = tuple(example(controller) for controller in METHODS)
 ITEMS = (
-    Item("htmpc-fig-3", "The random square waves", f"{SOURCE}-A, Fig. 3", _examples, _fig_3),
-    Item("htmpc-fig-4", "The example over time", f"{SOURCE}-A, Fig. 4", _examples, _fig_4),
-    Item("htmpc-fig-6", "Random square waves, all methods", f"{SOURCE}-C, Fig. 6", _jobs, _fig_6),
-    Item("htmpc-fig-7", "Where the errors are", f"{SOURCE}-C, Fig. 7", _jobs, _fig_7),
+    described("htmpc-fig-3", _EXAMPLES, _fig_3),
+    described("htmpc-fig-4", _EXAMPLES, _fig_4),
+    described("htmpc-fig-6", _jobs, _fig_6),
+    described("htmpc-fig-7", _jobs, _fig_7),
 )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.htmpc_paper.runs import SOURCE, example, hand_mm, normalised
-from lessons.papers.item import Item, PaperCheck, Row, Section, Table, between
+from lessons.papers.htmpc_paper.runs import example, hand_mm, normalised
+from lessons.papers.item import PaperCheck, Row, Section, Table, between
+from lessons.papers.texts import described, drawn
 from lessons.papers.words import number, printed, trouble, unprinted
-from lessons.plots.panels import Panel, Picture, PlotCurve
+from lessons.plots.panels import Panel, PlotCurve
 
 EQUATIONS = {"cost": "(11)", "per_coordinate": "(12)"}
 LETTERS = {"paper": "A", "proximal": "C"}
@@ -60,11 +61,8 @@ def _table(results: Results, quick: bool) -> Section:
         "mean step",
         "share of zero steps",
     )
-    notes = (
-        "EE error on one square wave. Formulation A takes the paper's weights literally. In the default C "
-        "upper levels pay for deviations from the shifted previous plan, and limits are hard constraints.",
-    )
-    return Section(notes, tuple(rows), (Table("The base error and the line search", columns, tuple(lines)),))
+    table = Table("The base error and the line search", columns, tuple(lines))
+    return Section(rows=tuple(rows), tables=(table,))
 
 
 def _order(results: Results, f: str, d: str) -> Row:
@@ -112,16 +110,7 @@ def _fig_5(results: Results, quick: bool) -> Section:
                 y_range=(1e-3, 1.5),
             )
         )
-    caption = (
-        "Base error divided by its value at the start of each part, with the 5 % bound of the paper's "
-        "Fig. 5. Curves are cut off below 1e-3."
-    )
-    return Section(
-        checks=_base_checks(results), pictures=(Picture("htmpc-fig-5", caption, tuple(panels), 2),)
-    )
+    return drawn("htmpc-fig-5", panels, 2, checks=_base_checks(results))
 
 
-ITEMS = (
-    Item("htmpc-table-1", "EE error under (11) and (12)", f"{SOURCE}-B, Table I", _jobs, _table),
-    Item("htmpc-fig-5", "Base error under (11) and (12)", f"{SOURCE}-B, Fig. 5", _jobs, _fig_5),
-)
+ITEMS = (described("htmpc-table-1", _jobs, _table), described("htmpc-fig-5", _jobs, _fig_5))

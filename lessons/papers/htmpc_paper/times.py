@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.htmpc_paper.runs import METHODS, SOURCE, example
-from lessons.papers.item import Item, Row, Section
+from lessons.papers.htmpc_paper.runs import METHODS, example
+from lessons.papers.item import Row, Section
+from lessons.papers.texts import described
 from lessons.papers.words import printed, trouble
 from lessons.scenes.run_spec import RunSpec
 
@@ -35,4 +36,4 @@ def _report(results: Results, quick: bool) -> Section:
     return Section(rows=tuple(rows))
 
 
-ITEMS = (Item("htmpc-times", "Compute times", SOURCE, lambda quick: tuple(_cases().values()), _report),)
+ITEMS = (described("htmpc-times", tuple(_cases().values()), _report),)

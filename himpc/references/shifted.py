@@ -1,12 +1,24 @@
-"""References that are extrapolated by a short time."""
+"""References whose time starts later, and previews that are extrapolated by a short time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import final
 
-from himpc.references.preview import Preview
+from himpc.references.preview import Preview, Reference
 from himpc.rotation import exp3
+
+
+@dataclass(frozen=True, eq=False)
+class Started:
+    """A reference whose own time is zero at the time `start`, s."""
+
+    reference: Reference
+    start: float
+
+    def preview(self, t: float, T_s: float, N: int) -> Preview:
+        return self.reference.preview(t - self.start, T_s, N)
 
 
 @final

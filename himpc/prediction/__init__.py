@@ -1,1 +1,0 @@
-"""Prediction: the incremental systems (15) and (18) over the horizon."""
