@@ -202,7 +202,7 @@ def test_a_guess_that_came_too_late_is_not_drawn() -> None:
     slider = gui.add_slider.return_value
     slider.value = STEPS
     with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
-        elsewhere.submit(lambda: asyncio.run(slider.on_update.call_args.args[0](None))).result()
+        elsewhere.submit(lambda: asyncio.run(slider.on_update.call_args.args[0](MagicMock()))).result()
     assert figure(prediction.high, prediction.measure.unit) in picture.content
     kept = prediction.low * 2
     asking.show(graded(prediction, kept, kept))

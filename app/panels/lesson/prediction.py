@@ -16,7 +16,7 @@ from app.html.palette import BAD, BOUND, GOOD, LEVELS, button, css
 from app.html.text import badge, block, figure, readable
 from app.link.exercise import Answer, Lecture
 from app.panels.lesson.drawing import scale, sketch
-from app.panels.widgets.command import on_click
+from app.panels.widgets.command import on_change, on_click
 from app.panels.widgets.controls import STEPS, only_track, place_of, value_at
 from lessons.teaching.prediction import Choice, Prediction, Sketch, Value
 
@@ -64,10 +64,7 @@ class Asking:
         )
         self._style.content = only_track(slider)
         self._inputs.append(slider)
-
-        @slider.on_update
-        async def _(_: object) -> None:
-            self._say(value_at(float(slider.value), value.low, value.high))
+        on_change(slider, lambda: self._say(value_at(float(slider.value), value.low, value.high)))
 
     def _draw(self, gui: viser.GuiApi, wanted: Sketch) -> None:
         sliders = []
@@ -84,11 +81,12 @@ class Asking:
                 )
             )
         self._inputs += sliders
-        for slider in sliders:
 
-            @slider.on_update
-            async def _(_: object) -> None:
-                self._say(tuple((wanted.until * k / _POINTS, float(s.value)) for k, s in enumerate(sliders)))
+        def say() -> None:
+            self._say(tuple((wanted.until * k / _POINTS, float(s.value)) for k, s in enumerate(sliders)))
+
+        for slider in sliders:
+            on_change(slider, say)
 
     @property
     def suggested(self) -> Answer | None:
