@@ -16,7 +16,7 @@ from app.client.progress import Notebook
 from app.html.markdown import explained, rendered, rendered_line, split, word_count, words
 from app.html.palette import GHOST
 from app.html.text import figure, joints_named, readable
-from app.link.exercise import Lecture, LessonPlace, SignalCurve
+from app.link.exercise import Lecture, LessonPlace, Predict, SignalCurve
 from app.panels.lesson.cards import GROUPS, PATHS
 from app.panels.lesson.claims import pictures, state
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
@@ -164,7 +164,7 @@ def test_the_options_are_the_buttons_and_say_what_was_right() -> None:
     assert labels == ["A   one or two", "B   three or four", "C   five or more"]
     with ThreadPoolExecutor(1) as elsewhere:
         elsewhere.submit(lambda: asyncio.run(options[0].on_click.call_args.args[0](None))).result()
-    assert said == [0] and options[0].label == "A   one or two   (your answer)"
+    assert said == [Predict(0)] and options[0].label == "A   one or two   (your answer)"
 
     asking.show(graded(prediction, 0, 7.0))
     assert [each.label for each in options] == [

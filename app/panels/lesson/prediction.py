@@ -14,7 +14,7 @@ from app.adapter.private import dom_id
 from app.html.markdown import rendered_line
 from app.html.palette import BAD, BOUND, GOOD, LEVELS, button, css
 from app.html.text import badge, block, figure, readable
-from app.link.exercise import Answer, Lecture
+from app.link.exercise import Answer, Lecture, Predict
 from app.panels.lesson.drawing import scale, sketch
 from app.panels.widgets.command import on_change, on_click
 from app.panels.widgets.controls import STEPS, only_track, place_of, value_at
@@ -27,8 +27,8 @@ _POINTS = 5
 class Asking:
     """The input of a prediction. A prediction is sent at once and may be changed until the run begins."""
 
-    def __init__(self, gui: viser.GuiApi, prediction: Prediction, predict: Callable[[Answer], None]) -> None:
-        self._prediction, self._predict = prediction, predict
+    def __init__(self, gui: viser.GuiApi, prediction: Prediction, send: Callable[[Predict], None]) -> None:
+        self._prediction, self._send = prediction, send
         self._mine: Answer | None = None
         self._picture = gui.add_html("")
         self._inputs: list[Any] = []
@@ -102,7 +102,7 @@ class Asking:
 
     def _say(self, answer: Answer) -> None:
         self._mine = answer
-        self._predict(answer)
+        self._send(Predict(answer))
         self._write(None)
 
     # ---------------------------------------------------------------- showing

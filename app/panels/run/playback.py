@@ -198,8 +198,7 @@ class TimeLine:
 
     def update(self, running: bool) -> None:
         """Shows or hides the slider; called for every frame, before the page reads `past`."""
-        recording = self._learner.recording
-        first, last = (0.0, 0.0) if recording is None else recording.span
+        first, last = self._learner.read(lambda recording: recording.span) or (0.0, 0.0)
         if running or last - first < _LEAST:
             if self._paused_at is not None:
                 self._leave()
