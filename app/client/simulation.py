@@ -80,7 +80,7 @@ class Simulation(ABC):
         """The state code of the setting, as the process reported it; "" if there is none."""
         self.failure: str | None = None
         self.changed = 0
-        self.recording: Recording | None = None
+        self._recording: Recording | None = None
         self._refusals: list[str] = []
         self._notices: list[str] = []
         self._spares = spares
@@ -103,8 +103,7 @@ class Simulation(ABC):
     @property
     def figures(self) -> RunFigures | None:
         """The figures of the run; None before the first row."""
-        recording = self.recording
-        return None if recording is None else recording.statistics.result()
+        return self.read(lambda recording: recording.statistics.result())
 
     @property
     def pid(self) -> int | None:
@@ -166,17 +165,17 @@ class Simulation(ABC):
         """Handles the other effects of a report, on the thread of the process that sent it."""
 
     def _enter(self, ready: Ready) -> None:
-        before, block = self.recording, Block.for_robot(ready.robot, ready.layout.size, ready.block)
+        before, block = self._recording, Block.for_robot(ready.robot, ready.layout.size, ready.block)
         again = None if before is None or not ready.again else before.under(block, ready.layout)
         self._free()
         self.ready, self.settings = ready, ready.settings
-        self.recording = again or Recording(block, ready.layout)
+        self._recording = again or Recording(block, ready.layout)
         if not ready.again:
             self.status, self.code = None, ""
         self.changed += 1
 
     def _free(self) -> None:
-        recording, self.recording = self.recording, None
+        recording, self._recording = self._recording, None
         if recording is not None:
             recording.block.close()
 
@@ -199,7 +198,7 @@ class Simulation(ABC):
         """Calls `look` and returns its result; the recorded block cannot be freed meanwhile. Returns None
         before the first scene."""
         with self._lock:
-            return None if self.recording is None else look(self.recording)
+            return None if self._recording is None else look(self._recording)
 
     def look(self, rows: bool = True) -> float | None:
         """Records what is new, and returns the simulated time, s; see `Recording.look`."""

@@ -57,11 +57,15 @@ def ticks(low: float, high: float, about: int = 4) -> list[float]:
     ]
 
 
+def powers_of_ten(low: float, high: float) -> list[float]:
+    """Returns the powers of ten between two values above 0."""
+    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
+    return [10.0**k for k in range(first, last + 1)]
+
+
 def decades(low: float, high: float) -> list[float]:
     """Returns at most five powers of ten between two values above 0."""
-    found = [
-        10.0**k for k in range(math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9) + 1)
-    ]
+    found = powers_of_ten(low, high)
     return found[:: -(-len(found) // 5) or 1]
 
 

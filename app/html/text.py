@@ -59,6 +59,11 @@ def block(inner: str, style: str = "", lines: int = 0) -> str:
     return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{room}{style}">{inner}</div>'
 
 
+def suggestion(head: str, rest: str) -> str:
+    """Returns what a page suggests to try, in larger letters, and the sentences about it."""
+    return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
+
+
 def in_trouble(state: str, sentence: str) -> str:
     """Returns the text that a page shows for a simulation that ended unexpectedly, hangs or takes long."""
     colour = GOOD if state == "PREPARING" else BAD

@@ -123,10 +123,8 @@ class Play:
 
 
 @dataclass(frozen=True)
-class StepTicks:
-    """Pause, then run this number of ticks."""
-
-    ticks: int = 1
+class StepTick:
+    """Pause, then run one tick."""
 
 
 @dataclass(frozen=True)
@@ -165,12 +163,10 @@ class WaitAt:
 
 @dataclass(frozen=True, eq=False)
 class Begin:
-    """The start of a ghost: the leader's scene, and its settings at its last reset. q_0: (n,) rad, the
-    configuration in which the ghost begins at rest; None: the scene's configuration."""
+    """The start of a ghost: the leader's scene, and its settings at its last reset."""
 
     choice: SceneChoice
     settings: SceneSettings
-    q_0: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +191,7 @@ class Quit:
 Command = (
     Post
     | Play
-    | StepTicks
+    | StepTick
     | Speed
     | ResetAll
     | Load

@@ -138,6 +138,10 @@ class PageContext:
         """Sends a command to the simulation."""
         self.learner.send(command)
 
+    def notify(self, title: str, sentence: str) -> None:
+        """Shows why a request has no effect."""
+        self.client.add_notification(title, sentence, color="orange", auto_close_seconds=10.0)
+
     def poses(self) -> np.ndarray | None:
         """Poses of all joints and the tip, (J, 7); None if another scene was loaded meanwhile, since
         its robot may have another number of joints."""

@@ -9,9 +9,9 @@ from itertools import product
 
 import numpy as np
 import viser
-import viser.transforms as vtf
 
 from app.html.palette import RGB
+from app.view.surroundings import placed, solid
 from app.view.targets import Handle, put
 from robots.collision import Ball, Box, Floor, Obstacle
 
@@ -61,22 +61,8 @@ class _Solid:
     """One obstacle with its arrows."""
 
     def __init__(self, scene: viser.SceneApi, index: int, obstacle: Ball | Box, moved: Moved) -> None:
-        self._body: viser.BoxHandle | viser.IcosphereHandle
-        if isinstance(obstacle, Box):
-            turn = vtf.SO3.from_z_radians(obstacle.yaw).wxyz
-            self._body = scene.add_box(
-                f"/obstacle/{index}",
-                color=_COLOUR,
-                dimensions=obstacle.size,
-                position=obstacle.centre,
-                wxyz=turn,
-            )
-            size = 0.5 * max(obstacle.size)
-        else:
-            self._body = scene.add_icosphere(
-                f"/obstacle/{index}", radius=obstacle.radius, color=_COLOUR, position=obstacle.centre
-            )
-            size = obstacle.radius
+        self._body = solid(scene, f"/obstacle/{index}", obstacle, _COLOUR, **placed(obstacle))
+        size = 0.5 * max(obstacle.size) if isinstance(obstacle, Box) else obstacle.radius
         self._handle = Handle(
             scene,
             f"/obstacle_arrows/{index}",
@@ -128,15 +114,13 @@ class ReportedObstacles:
 
     def _draw(self, index: int, true: Ball | Box, told: Ball | Box) -> list[viser.SceneNodeHandle]:
         scene, node = self._scene, f"/reported/{index}"
-        turn = vtf.SO3.from_z_radians(told.yaw if isinstance(told, Box) else 0.0).wxyz
-        root = scene.add_frame(node, show_axes=False, position=told.centre, wxyz=turn)
+        root = scene.add_frame(node, show_axes=False, **placed(told))
+        solid(scene, f"{node}/fill", told, _WRONG, opacity=_FILL)
         if isinstance(told, Box):
-            scene.add_box(f"{node}/fill", color=_WRONG, dimensions=told.size, opacity=_FILL)
             scene.add_line_segments(
                 f"{node}/outline", _edges(told), _WRONG, thickness=_LINE, thickness_units="screen"
             )
         else:
-            scene.add_icosphere(f"{node}/fill", radius=told.radius, color=_WRONG, opacity=_FILL)
             scene.add_icosphere(
                 f"{node}/outline", radius=told.radius, color=_WRONG, subdivisions=2, wireframe=True
             )

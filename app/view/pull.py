@@ -12,6 +12,7 @@ import viser.transforms as vtf
 from app.html.palette import BAD
 from app.tab.mirror import Send
 from app.view.robot import RobotView
+from app.view.trails import NOTHING
 from lessons.events import Push
 from robots import PlantSettings, Robot
 from robots.truth import true_model
@@ -43,7 +44,7 @@ class Pull:
         self._poses = np.zeros((0, 7))
         self._arrow = scene.add_arrows(
             "/pull",
-            np.zeros((1, 2, 3), np.float32),
+            NOTHING,
             BAD,
             shaft_radius=0.006,
             head_radius=0.018,

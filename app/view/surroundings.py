@@ -3,11 +3,15 @@ contact forces."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import viser
 
 from app.html.palette import BAD, BOUND, JOINTS, RGB
 from app.link.messages import ContactPoint, Person
+from app.view.trails import NOTHING, segments
+from robots.collision import WorldShape
 from robots.world import Ball, Box, Floor, Post, Thing, World
 
 _BALL: RGB = (245, 190, 30)
@@ -79,9 +83,8 @@ class ReachCircle:
         radius: m."""
         angles = np.linspace(0.0, 2 * np.pi, _POINTS + 1)
         circle = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros_like(angles)], axis=1)
-        segments = np.stack([circle[:-1], circle[1:]], axis=1).astype(np.float32)
         self._circle = scene.add_line_segments(
-            f"/robot/{joint}/reach", segments, BOUND, thickness=0.012, position=(0.0, 0.0, 0.006)
+            f"/robot/{joint}/reach", segments(circle), BOUND, thickness=0.012, position=(0.0, 0.0, 0.006)
         )
 
     def show(self, on: bool) -> None:
@@ -92,7 +95,6 @@ _STATIC: RGB = (160, 150, 140)
 _FREE: RGB = (70, 150, 190)
 _PER_NEWTON = 1e-3  # m: length of an arrow per newton
 _LONGEST, _SHORTEST = 0.35, 0.02  # m
-_HIDDEN = np.zeros((1, 2, 3), np.float32)
 
 
 class WorldView:
@@ -101,8 +103,11 @@ class WorldView:
     def __init__(self, scene: viser.SceneApi, world: World) -> None:
         self._free: list[viser.SceneNodeHandle] = []
         for index, thing in enumerate(world):
-            node = _drawn(scene, f"/world/{index}", thing)
-            if node is not None and thing.free:
+            if isinstance(thing.shape, Floor):
+                continue
+            colour = _FREE if thing.free else _STATIC
+            node = solid(scene, f"/world/{index}", thing.shape, colour, **placed(thing.shape))
+            if thing.free:
                 self._free.append(node)
 
     def follow(self, poses: np.ndarray) -> None:
@@ -112,18 +117,23 @@ class WorldView:
                 node.position, node.wxyz = pose[:3], pose[3:]
 
 
-def _drawn(scene: viser.SceneApi, name: str, thing: Thing) -> viser.SceneNodeHandle | None:
-    pose, colour = np.array(thing.pose), _FREE if thing.free else _STATIC
-    position, wxyz = pose[:3], pose[3:]
-    match thing.shape:
+def solid(
+    scene: viser.SceneApi, name: str, shape: Ball | Box | Post, colour: RGB, **more: Any
+) -> viser.SceneNodeHandle:
+    """Draws an object about its middle. more: its place, see `placed`, and its opacity."""
+    match shape:
         case Ball(_, _, radius):
-            return scene.add_icosphere(name, radius, colour, position=position)
+            return scene.add_icosphere(name, radius, colour, **more)
         case Box(_, _, size):
-            return scene.add_box(name, colour, dimensions=size, position=position, wxyz=wxyz)
+            return scene.add_box(name, colour, dimensions=size, **more)
         case Post(_, _, height, radius):
-            return scene.add_cylinder(name, radius, height, colour, position=position)
-        case Floor():
-            return None
+            return scene.add_cylinder(name, radius, height, colour, **more)
+
+
+def placed(shape: WorldShape) -> dict[str, Any]:
+    """Returns the position and the rotation of an object's middle, as attributes of a node."""
+    x, y, z, *wxyz = Thing(shape).pose
+    return {"position": (x, y, z), "wxyz": wxyz}
 
 
 class ContactView:
@@ -133,7 +143,7 @@ class ContactView:
     def __init__(self, scene: viser.SceneApi) -> None:
         self._shown: tuple[ContactPoint, ...] = ()
         self._arrows = scene.add_arrows(
-            "/contacts", _HIDDEN, BAD, shaft_radius=0.006, head_radius=0.016, head_length=0.035, visible=False
+            "/contacts", NOTHING, BAD, shaft_radius=0.006, head_radius=0.016, head_length=0.035, visible=False
         )
         self._label = scene.add_label("/contact_label", "", visible=False)
 

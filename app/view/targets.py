@@ -18,6 +18,7 @@ from app.link.messages import Ready, TaskView
 from app.tab.context import PageContext
 from app.tab.mirror import HOLD, Send
 from app.view.robot import gizmo_size, target_radius
+from app.view.trails import NOTHING
 from lessons.events import MoveTarget
 from robots import Robot
 
@@ -137,8 +138,7 @@ class Gap:
     def __init__(
         self, scene: viser.SceneApi, node: str, colour: RGB, thickness: float, least: float = 0.0
     ) -> None:
-        start = np.zeros((1, 2, 3), np.float32)
-        self._line = scene.add_line_segments(node, start, colour, thickness=thickness, visible=False)
+        self._line = scene.add_line_segments(node, NOTHING, colour, thickness=thickness, visible=False)
         self._least = least
 
     def show(self, point: np.ndarray, target: np.ndarray) -> None:

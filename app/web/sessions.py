@@ -159,7 +159,7 @@ def _of_the_session(name: str) -> property:
 
 
 for _name in (
-    *("ready", "status", "settings", "failure", "changed", "recording", "figures", "choice", "lecture"),
+    *("ready", "status", "settings", "failure", "changed", "figures", "choice", "lecture"),
     *("ghost", "pid", "quiet", "trouble", "settings_of", "choice_of", "lecture_of", "read", "look", "ask"),
     *("code", "compiles"),
 ):

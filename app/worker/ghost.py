@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import final
-
-import numpy as np
 
 from app.link.messages import Begin, Command, FollowLeader, Loading, LoadRefused, Quit, Reached
 from app.link.process import send
 from app.worker.simulation import SimulationRunner
-from lessons.scenes.catalog import as_torque_scene
 from lessons.session.ghost import GhostDriver, ghost_scene
 from robots import InputError
 
@@ -30,9 +26,6 @@ class GhostBody:
         """Raises InputError if the scene cannot be loaded, or if `own` contains settings that do not fit the
         scene."""
         scene = ghost_scene(begin.choice.scene(), begin.settings, own)
-        if begin.q_0 is not None:
-            rest = np.zeros(len(begin.q_0))
-            scene = replace(as_torque_scene(scene, "an arm"), q_0=begin.q_0, v_0=rest, tau_0=None)
         # The lesson judges the robot, not its ghost.
         self.body = SimulationRunner(begin.choice, scene, judged=False)
         self.driver = GhostDriver(self.body.session, begin.settings, own)

@@ -29,7 +29,7 @@ from app.link.messages import (
     Script,
     Speed,
     Status,
-    StepTicks,
+    StepTick,
     WaitAt,
 )
 from app.link.poses import LinkPoses
@@ -261,7 +261,7 @@ class SimulationRunner:
     def handle(self, command: Command) -> Report | None:
         """Executes a command; returns the answer for the page, if the command has one."""
         lecturer = self.lecturer
-        if lecturer is not None and lecturer.unanswered and isinstance(command, (Play, StepTicks, RunStep)):
+        if lecturer is not None and lecturer.unanswered and isinstance(command, (Play, StepTick, RunStep)):
             self.session.notices.append("Make a prediction first: this step compares it with the run.")
             return None
         match command:
@@ -291,10 +291,10 @@ class SimulationRunner:
             case Play(running):
                 self.running, self._steps = running, 0
                 self._finish_period()
-            case StepTicks(ticks):
+            case StepTick():
                 self.running = False
                 self._finish_period()
-                self._steps += ticks
+                self._steps += 1
             case Speed(factor):
                 self.speed = factor
             case ResetAll():

@@ -14,7 +14,7 @@ import pytest
 from app.client.recording import BUCKETS, Recording
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.link.messages import Load, LoadRefused, Play, Post, Ready, ResetAll, Speed, StepTicks
+from app.link.messages import Load, LoadRefused, Play, Post, Ready, ResetAll, Speed, StepTick
 from app.panels.run.playback import headline
 from app.worker.main import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
@@ -65,13 +65,13 @@ def test_pause_step_speed(body: SimulationRunner) -> None:
     body.handle(Play(False))
     assert not body.running
     body.handle(Play(True))
-    body.handle(StepTicks())
+    body.handle(StepTick())
     assert not body.running and body.take_steps() == 1 and body.take_steps() == 0
     body.handle(Post(Reset()))
     assert body.take_steps() == 1  # the page shows a reset while paused
     body.handle(Play(True))
     body.handle(Post(Reset()))
-    body.handle(StepTicks())
+    body.handle(StepTick())
     assert body.take_steps() == 1  # one press gives one tick
     body.handle(Speed(0.5))
     assert body.status().speed == 0.5

@@ -17,7 +17,7 @@ from app.client.progress import Notebook
 from app.html.markdown import explained, rendered, rendered_line, split, word_count, words
 from app.html.palette import GHOST
 from app.html.text import figure, formula, joints_named, readable
-from app.link.exercise import Lecture, LessonPlace, SignalCurve
+from app.link.exercise import Lecture, LessonPlace, Predict, SignalCurve
 from app.panels.lesson.cards import GROUPS, PATHS, belonging_to, card, exercise_cards
 from app.panels.lesson.claims import pictures, state
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
@@ -167,7 +167,7 @@ def test_the_options_are_the_buttons_and_say_what_was_right() -> None:
     assert labels == ["A   one or two", "B   three or four", "C   five or more"]
     with ThreadPoolExecutor(1) as elsewhere:
         elsewhere.submit(lambda: asyncio.run(options[0].on_click.call_args.args[0](None))).result()
-    assert said == [0] and options[0].label == "A   one or two   (your answer)"
+    assert said == [Predict(0)] and options[0].label == "A   one or two   (your answer)"
 
     asking.show(graded(prediction, 0, 7.0))
     assert [each.label for each in options] == [
@@ -205,7 +205,7 @@ def test_a_guess_that_came_too_late_is_not_drawn() -> None:
     slider = gui.add_slider.return_value
     slider.value = STEPS
     with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
-        elsewhere.submit(lambda: asyncio.run(slider.on_update.call_args.args[0](None))).result()
+        elsewhere.submit(lambda: asyncio.run(slider.on_update.call_args.args[0](MagicMock()))).result()
     assert figure(prediction.high, prediction.measure.unit) in picture.content
     kept = prediction.low * 2
     asking.show(graded(prediction, kept, kept))

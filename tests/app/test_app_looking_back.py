@@ -204,6 +204,11 @@ def test_a_recording_of_any_length_stays_small_and_exact(recording: Recording, l
     assert len(recording.whole()) == len(recording.minute()) == 1
 
 
+def test_the_last_minute_of_a_slow_controller_is_a_minute(recording: Recording, layout: Layout) -> None:
+    recording.take(rows_at(layout, 0.1 * np.arange(900), "unsolved", np.zeros(900)))
+    assert len(recording.minute()) == pytest.approx(600, abs=1) and len(recording.whole()) == 900
+
+
 @pytest.fixture(scope="module")
 def run(body: SimulationRunner) -> Recorded:
     recording = Recording(body.block, body.session.layout)

@@ -14,7 +14,7 @@ from served import visited
 from app.client.recording import Recording
 from app.html.text import free_name
 from app.link.choice import SceneChoice
-from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, StepTicks
+from app.link.messages import MissionView, Play, Post, Ready, ResetAll, Status, StepTick
 from app.panels.run.plots import PlotsPanel, velocity_plots
 from app.panels.velocity.mission import RolesPanel
 from app.view.goals import open_row
@@ -111,7 +111,7 @@ def test_a_pause_stands_between_two_control_steps(body: SimulationRunner) -> Non
     assert [row.name for row in mission(status).rows] == ["base", "ee"]
     assert np.allclose(status.targets["ee"], (1.0, 0.5, 0.8))
     assert len(status.notices) == 1 and "horizon" in status.notices[0]
-    body.handle(StepTicks())
+    body.handle(StepTick())
     assert body.take_steps() == 1
     body.tick()
     assert body.session.t == pytest.approx(0.3)
@@ -125,7 +125,7 @@ def test_a_pause_stands_between_two_control_steps(body: SimulationRunner) -> Non
 def test_a_step_while_running_pauses_first(body: SimulationRunner) -> None:
     for _ in range(3):
         body.advance()
-    body.handle(StepTicks())
+    body.handle(StepTick())
     assert not body.running and body.ticks == 1 and body.take_steps() == 1
 
 

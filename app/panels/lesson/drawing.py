@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from app.html.palette import BOUND, DARK_PAGE, GOOD, LEVELS, LIGHT_PAGE, RGB, css, ink
-from app.html.svg import decades, element, path, path_through, picture, text, tick_label, ticks
+from app.html.svg import decades, element, path, path_through, picture, powers_of_ten, text, tick_label, ticks
 from app.html.text import esc, figure
 from app.link.exercise import SignalCurve
 
@@ -30,10 +30,9 @@ def scale(low: float, high: float, guess: float | None, truth: float | None, fac
         return 14 + (_W - 28) * min(max(share, -0.02), 1.02)
 
     parts = [path(f"M14 34H{_W - 14}", stroke="currentColor", stroke_width=1.5)]
-    for power in range(math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9) + 1):
-        at = x(10.0**power)
-        parts.append(path(f"M{at:.1f} 30V38", stroke="currentColor"))
-        parts.append(_text(at, 51, figure(10.0**power), anchor="middle"))
+    for power in powers_of_ten(low, high):
+        parts.append(path(f"M{x(power):.1f} 30V38", stroke="currentColor"))
+        parts.append(_text(x(power), 51, figure(power), anchor="middle"))
     if truth is not None and math.isfinite(truth) and truth > 0:
         left, right = x(truth / factor), x(truth * factor)
         parts.append(element("rect", x=left, width=right - left, y=26, height=16, fill=css(GOOD, 0.25)))

@@ -14,9 +14,9 @@ from app.adapter.private import dom_id
 from app.html.markdown import rendered_line
 from app.html.palette import BAD, BOUND, GOOD, LEVELS, button, css
 from app.html.text import badge, block, figure, readable
-from app.link.exercise import Answer, Lecture
+from app.link.exercise import Answer, Lecture, Predict
 from app.panels.lesson.drawing import scale, sketch
-from app.panels.widgets.command import on_click
+from app.panels.widgets.command import on_change, on_click
 from app.panels.widgets.controls import STEPS, only_track, place_of, value_at
 from lessons.teaching.prediction import Choice, Prediction, Sketch, Value
 
@@ -27,8 +27,8 @@ _POINTS = 5
 class Asking:
     """The input of a prediction. A prediction is sent at once and may be changed until the run begins."""
 
-    def __init__(self, gui: viser.GuiApi, prediction: Prediction, predict: Callable[[Answer], None]) -> None:
-        self._prediction, self._predict = prediction, predict
+    def __init__(self, gui: viser.GuiApi, prediction: Prediction, send: Callable[[Predict], None]) -> None:
+        self._prediction, self._send = prediction, send
         self._mine: Answer | None = None
         self._picture = gui.add_html("")
         self._inputs: list[Any] = []
@@ -64,10 +64,7 @@ class Asking:
         )
         self._style.content = only_track(slider)
         self._inputs.append(slider)
-
-        @slider.on_update
-        async def _(_: object) -> None:
-            self._say(value_at(float(slider.value), value.low, value.high))
+        on_change(slider, lambda: self._say(value_at(float(slider.value), value.low, value.high)))
 
     def _draw(self, gui: viser.GuiApi, wanted: Sketch) -> None:
         sliders = []
@@ -84,11 +81,12 @@ class Asking:
                 )
             )
         self._inputs += sliders
-        for slider in sliders:
 
-            @slider.on_update
-            async def _(_: object) -> None:
-                self._say(tuple((wanted.until * k / _POINTS, float(s.value)) for k, s in enumerate(sliders)))
+        def say() -> None:
+            self._say(tuple((wanted.until * k / _POINTS, float(s.value)) for k, s in enumerate(sliders)))
+
+        for slider in sliders:
+            on_change(slider, say)
 
     @property
     def suggested(self) -> Answer | None:
@@ -104,7 +102,7 @@ class Asking:
 
     def _say(self, answer: Answer) -> None:
         self._mine = answer
-        self._predict(answer)
+        self._send(Predict(answer))
         self._write(None)
 
     # ---------------------------------------------------------------- showing

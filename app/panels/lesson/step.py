@@ -67,14 +67,13 @@ class LessonPanel:
 
     def _build(self) -> None:
         gui, part = self._page.gui, self._part
-        self._heading = gui.add_html(heading(self._exercise))
+        gui.add_html(heading(self._exercise))
         if self._far is not None:
             self._idea = gui.add_html("")
         prediction = part.prediction if isinstance(part, Step) else None
-        self._asking = None if prediction is None else Asking(gui, prediction, self._predict)
-        self._knobs_first = gui.add_folder("Your knobs") if isinstance(part, Challenge) else None
-        if isinstance(part, Challenge) and self._knobs_first is not None:
-            with self._knobs_first:
+        self._asking = None if prediction is None else Asking(gui, prediction, self._page.send)
+        if isinstance(part, Challenge):
+            with gui.add_folder("Your knobs"):
                 for knob in part.knobs:
                     add_control(gui, self._bindings, knob, self._page.settings)
         self._run = gui.add_button("Run this step", color=button(LEVELS[1]), hint="Key P")
@@ -157,9 +156,6 @@ class LessonPanel:
         return f"Next: {after.title if isinstance(after, Step) else 'the challenge'}"
 
     # ---------------------------------------------------------------- doing
-
-    def _predict(self, answer: Predict | object) -> None:
-        self._page.send(Predict(answer))  # pyright: ignore[reportArgumentType]
 
     def run(self) -> None:
         lecture, asking = self._lecture, self._asking

@@ -11,7 +11,7 @@ import viser
 
 from app.html.palette import GOOD, LEVELS, css
 from app.html.text import bar, block, esc
-from app.panels.widgets.command import on_click
+from app.panels.widgets.command import on_change, on_click
 
 BETWEEN = 1.0
 """Time, s, between two attempts of one page. Only this page waits, not other pages or the server."""
@@ -95,10 +95,7 @@ class ClassCard:
             gui.add_html(block(f"Your teacher sees your account, <b>{esc(name)}</b>."))
         elif call is not None:
             typed = gui.add_text(_NAME, name, hint="Only your teacher sees your name. It is optional.")
-
-            @typed.on_update
-            async def _(_: object) -> None:
-                call(str(typed.value))
+            on_change(typed, lambda: call(str(typed.value)))
 
     def show(self, view: Mapping[str, Any]) -> None:
         """Shows a view of the class: the result of `app.classes.views.for_all` with more fields. `away`:

@@ -29,9 +29,9 @@ class ComparePanel:
 
     def __init__(self, page: PageContext) -> None:
         gui, learner, settings = page.gui, page.learner, page.settings
-        self._learner, self._colours = learner, page.colours
+        self._page, self._learner, self._colours = page, learner, page.colours
         self._choices = {each.shown.name: each for each in usual_settings(settings)}
-        self._intro = gui.add_html(_INTRO)
+        gui.add_html(_INTRO)
         self._controller = gui.add_dropdown(
             "Ghost's controller", (_SAME, *settings.controllers), initial_value=_SAME
         )
@@ -45,17 +45,9 @@ class ComparePanel:
         self._table = gui.add_html("", visible=False)
 
         # The callbacks run on a thread, as they start processes or wait for one to end.
-        @self._start.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            self._begin(event.client)
-
-        @self._swap.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            self._change_sides(event.client)
-
-        @self._end.on_click
-        def _(_: object) -> None:
-            learner.stop_ghost()
+        self._start.on_click(lambda _: self._begin())
+        self._swap.on_click(lambda _: self._change_sides())
+        self._end.on_click(lambda _: learner.stop_ghost())
 
     def _row(self, gui: viser.GuiApi, place: int) -> tuple[viser.GuiDropdownHandle[str], viser.GuiTextHandle]:
         with gui.add_folder(None, visible=place == 1) as folder:
@@ -75,7 +67,7 @@ class ComparePanel:
         self._folders.append(folder)
         return path, value
 
-    def _begin(self, client: viser.ClientHandle | None) -> None:
+    def _begin(self) -> None:
         own: list[str] = []
         words: list[str] = []
         if self._controller.value != _SAME:
@@ -87,14 +79,11 @@ class ComparePanel:
                 own.append(f"{choice.path}={value.value}")
                 words.append(f"{choice.shown.name} = {value.value}")
         if not own:
-            if client is not None:
-                client.add_notification(
-                    "No difference", "Choose another controller or a setting for the ghost.", color="orange"
-                )
+            self._page.notify("No difference", "Choose another controller or a setting for the ghost.")
             return
         self._learner.start_ghost(Ghost(", ".join(words), tuple(own)))
 
-    def _change_sides(self, client: viser.ClientHandle | None) -> None:
+    def _change_sides(self) -> None:
         learner = self._learner
         ghost, settings = learner.ghost, learner.settings
         if ghost is None or settings is None:
@@ -102,8 +91,7 @@ class ComparePanel:
         try:
             own, events = swapped(settings, ghost.own)
         except InputError as error:
-            if client is not None:
-                client.add_notification("Not swapped", str(error), color="orange")
+            self._page.notify("Not swapped", str(error))
             return
         for event in events:
             learner.send(Post(event))

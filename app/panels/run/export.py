@@ -52,15 +52,12 @@ class ExportPanel:
         button = gui.add_button(label, hint=hint)
 
         @button.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # on a thread, as it takes seconds
-            client = event.client
-            if client is None:
-                return
+        def _(_: object) -> None:  # on a thread, as it takes seconds
             made = make()
             if made is None:
-                client.add_notification("Nothing recorded yet", "Let the robot run first.", color="orange")
-                return
-            client.send_file_download(*made, save_immediately=True)
+                self._page.notify("Nothing recorded yet", "Let the robot run first.")
+            else:
+                self._page.client.send_file_download(*made, save_immediately=True)
 
     def _rows(self, simulation: Simulation) -> Recorded | None:
         minute = self._span.value == _MINUTE
@@ -144,7 +141,7 @@ class SharePanel:
     """The panel of texts, which are made on request, on viser's threads."""
 
     def __init__(self, page: PageContext) -> None:
-        gui, self._learner = page.gui, page.learner
+        gui, self._page = page.gui, page
         with gui.add_folder("Share the setting"):
             gui.add_html(_SHARE)
             make = gui.add_button("Write it down")
@@ -156,49 +153,39 @@ class SharePanel:
             given = gui.add_text("Somebody's code", "", hint="Same as himpc-lab --state CODE")
             take = gui.add_button("Open it")
 
-        @make.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            self._try(event.client, self._write)
+        # On threads: the simulation may answer late, and opening a code loads a scene twice.
+        make.on_click(lambda _: self._try(self._write))
+        save.on_click(lambda _: self._try(self._save))
+        take.on_click(lambda _: self._try(lambda: self._open(str(given.value))))
 
-        @save.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            client = event.client
-            if client is not None:
-                self._try(client, lambda told: self._save(client, told))
-
-        @take.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # on a worker: a scene is loaded twice
-            try:
-                page.choose(SceneChoice.of_state(decode(str(given.value))))
-            except InputError as error:
-                _refuse(event.client, error)
-
-    def _try(self, client: viser.ClientHandle | None, make: Callable[[RunDescription], None]) -> None:
-        told = self._learner.ask()
+    def _try(self, do: Callable[[], None]) -> None:
         try:
-            if told is None:
-                raise InputError("the simulation does not answer: press Reset all, then try again")
-            make(told)
+            do()
         except InputError as error:
-            _refuse(client, error)
+            self._page.notify("That does not work", str(error))
 
-    def _write(self, told: RunDescription) -> None:
-        state = state_now(told)
+    def _run(self) -> RunDescription:
+        told = self._page.learner.ask()
+        if told is None:
+            raise InputError("the simulation does not answer: press Reset all, then try again")
+        return told
+
+    def _open(self, code: str) -> None:
+        self._page.choose(SceneChoice.of_state(decode(code)))
+
+    def _write(self) -> None:
+        state = state_now(self._run())
         self._line.value = state.run.command_line()
         self._line.visible = True
         self._code.visible = False
         self._code.value = encode(state)
         self._code.visible = True
 
-    def _save(self, client: viser.ClientHandle, told: RunDescription) -> None:
-        choice = refuse_uploaded_robot(told.choice)
-        text = script(choice.run, told.log, told.t)
-        client.send_file_download(f"{choice.run.scene}.py", text.encode(), save_immediately=True)
-
-
-def _refuse(client: viser.ClientHandle | None, error: InputError) -> None:
-    if client is not None:
-        client.add_notification("That does not work", str(error), color="orange", auto_close_seconds=10.0)
+    def _save(self) -> None:
+        told = self._run()
+        run = refuse_uploaded_robot(told.choice).run
+        text = script(run, told.log, told.t)
+        self._page.client.send_file_download(f"{run.scene}.py", text.encode(), save_immediately=True)
 
 
 _SHARE = block(

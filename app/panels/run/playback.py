@@ -12,7 +12,7 @@ from app.adapter.private import unless_removed
 from app.client.simulation import Trouble
 from app.html.palette import LEVELS, ink
 from app.html.text import block, esc, in_trouble
-from app.link.messages import Play, Post, Speed, Status, StepTicks
+from app.link.messages import Play, Post, Speed, Status, StepTick
 from app.panels.widgets.command import add_command, on_change, on_click
 from app.tab.context import PageContext, SessionSnapshot
 from app.tab.mirror import HOLD, PendingEdit
@@ -85,7 +85,7 @@ class PlaybackPanel:
             learner.send(Play(self._running.ask(not running)))
         elif choice == _STEP:
             self._running.ask(False)
-            learner.send(StepTicks())
+            learner.send(StepTick())
         elif choice == _RESET and learner.trouble() is None:
             learner.send(Post(Reset()))
         else:
@@ -198,8 +198,7 @@ class TimeLine:
 
     def update(self, running: bool) -> None:
         """Shows or hides the slider; called for every frame, before the page reads `past`."""
-        recording = self._learner.recording
-        first, last = (0.0, 0.0) if recording is None else recording.span
+        first, last = self._learner.read(lambda recording: recording.span) or (0.0, 0.0)
         if running or last - first < _LEAST:
             if self._paused_at is not None:
                 self._leave()

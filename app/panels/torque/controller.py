@@ -9,9 +9,9 @@ from functools import partial
 import viser
 
 from app.html.palette import BAD, GOOD
-from app.html.text import bar, block, esc, formula, joint_labels
+from app.html.text import bar, block, formula, joint_labels
 from app.panels.inside.matrix import SpectrumPicture
-from app.panels.widgets.controls import Controls
+from app.panels.widgets.controls import ControllerChoice, Controls
 from app.tab.context import PageContext, SessionSnapshot
 from lessons.settings.period import USUAL, longest_period
 from lessons.settings.torque import TorqueSettings
@@ -27,10 +27,7 @@ class ControllerPanel:
     def __init__(self, page: PageContext) -> None:
         gui, settings = page.gui, page.settings
         controls = Controls(gui, page.bindings, settings)
-        with gui.add_folder("Which controller"):
-            controls.add("controller")
-            self._what = gui.add_html(block(esc(settings.controllers[settings.controller]), lines=2))
-        self._shown = settings.controller
+        self._choice = ControllerChoice(gui, controls, settings)
         self._deadline = DeadlineFolder(gui, controls)
         with gui.add_folder("Limits"):
             controls.add("limits.torque", "limits.velocity")
@@ -42,9 +39,7 @@ class ControllerPanel:
 
     def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         self._deadline.update(now)
-        if now.settings.controller != self._shown:
-            self._shown = now.settings.controller
-            self._what.content = block(esc(now.settings.controllers[self._shown]), lines=2)
+        self._choice.update(now.settings)
 
 
 class HorizonPanel:

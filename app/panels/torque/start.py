@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from app.html.palette import BAD, BOUND, GOOD, RGB, TARGET, ink
-from app.html.text import block, esc, joint_labels, joints_named, quantity, swatch
+from app.html.text import block, esc, joint_labels, joints_named, quantity, suggestion, swatch
 from app.link.messages import TaskView
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import add_dark_switch, in_colours_of_axes
@@ -47,8 +47,8 @@ def guide(
     places = {level.name: place for place, level in enumerate(levels, start=1) if level.enabled}
     target = draggable(tasks)
     if target is None:
-        return _paragraph(*_following(tasks, places))
-    return _paragraph(*(_next(places) if dragged else _first(target.position, places, colours)))
+        return suggestion(*_following(tasks, places))
+    return suggestion(*(_next(places) if dragged else _first(target.position, places, colours)))
 
 
 def _first(position: TaskView, places: Mapping[str, int], colours: Mapping[str, RGB]) -> tuple[str, str]:
@@ -108,10 +108,6 @@ def _listed(places: Mapping[str, int]) -> str:
 def spoken(level: str) -> str:
     """Returns the name of a level as words."""
     return joints_named(level).replace("+", " and ").replace("_", " ")
-
-
-def _paragraph(head: str, rest: str) -> str:
-    return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
 
 
 class StartPanel:

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.html.text import block, esc, formula
-from app.panels.widgets.controls import Controls
+from app.html.text import block, formula
+from app.panels.widgets.controls import ControllerChoice, Controls
 from app.tab.context import PageContext, SessionSnapshot
-from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import base_joints
 from himpc.htmpc.settings import efforts
 from lessons.settings.velocity import VelocitySettings
@@ -24,10 +23,7 @@ class HtmpcPanel:
         gui, settings = page.gui, page.settings
         self._page, self._robot = page, page.robot
         self._controls = controls = Controls(gui, page.bindings, settings)
-        with gui.add_folder("Which controller"):
-            controls.add("controller")
-            self._what = gui.add_html(block(esc(VELOCITY_CONTROLLERS[settings.controller]), lines=2))
-        self._shown = settings.controller
+        self._choice = ControllerChoice(gui, controls, settings)
         with gui.add_folder("Horizon"):
             self._ahead = gui.add_html("")
             controls.add_group("Horizon")
@@ -81,9 +77,7 @@ class HtmpcPanel:
 
     def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
         settings = now.settings
-        if settings.controller != self._shown:
-            self._shown = settings.controller
-            self._what.content = block(esc(VELOCITY_CONTROLLERS[self._shown]), lines=2)
+        self._choice.update(settings)
         htmpc = settings.htmpc
         self._ahead.content = block(
             f"Predicts the next <b>{htmpc.horizon * htmpc.dt:.2g} s</b>, every {1e3 * htmpc.period:.3g} ms."

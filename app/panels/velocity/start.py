@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from app.html.text import badge, block, esc, quantity, swatch
+from app.html.text import badge, block, esc, quantity, suggestion, swatch
 from app.panels.velocity.mission import swap
 from app.panels.widgets.command import on_click
 from app.panels.widgets.controls import add_dark_switch
@@ -105,9 +105,7 @@ def guide(scene: str, drives: bool, places: Mapping[str, float], dragged: bool) 
         role: f"<b>level {place:.0f}</b>" if place == place else "without a task"
         for role, place in places.items()
     }
-    return block(
-        f'<div style="font-size:1.15em"><b>{head}</b></div>{rest.format(**levels)}', "padding-top:0.5em"
-    )
+    return suggestion(head, rest.format(**levels))
 
 
 _FIRST = {

@@ -13,7 +13,7 @@ import viser
 from app.adapter.names import NUMBER_BOX, ROW, SLIDER_LABEL
 from app.adapter.private import dom_id
 from app.html.palette import AXES, css, ink
-from app.html.text import figure
+from app.html.text import block, esc, figure
 from app.panels.widgets.command import on_change
 from app.tab.context import PageContext
 from app.tab.mirror import Bindings, scalar
@@ -227,6 +227,19 @@ class Controls(Generic[S]):
                 step=shown.step or _tenth(value),
             )
         self._bindings.bind(number, lambda s: float(read(s)), lambda given: Set(setting.path, float(given)))
+
+
+class ControllerChoice:
+    """The folder with the menu of controllers and a sentence about the chosen one."""
+
+    def __init__(self, gui: viser.GuiApi, controls: Controls[Any], settings: SceneSettings) -> None:
+        with gui.add_folder("Which controller"):
+            controls.add("controller")
+            self._about = gui.add_html("")
+        self.update(settings)
+
+    def update(self, settings: SceneSettings) -> None:
+        self._about.content = block(esc(settings.controllers[settings.controller]), lines=2)
 
 
 def add_dark_switch(page: PageContext) -> None:
