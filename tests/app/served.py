@@ -43,7 +43,7 @@ def visited(
     choice: SceneChoice | str = "planar3-hold", **options: Any
 ) -> Iterator[tuple[Wire, SimulationClient]]:
     """Runs a server with one page, and yields the page and its simulation, which has begun."""
-    with served(choice, **options) as server, Wire(server.link) as page:
+    with served(choice, **options) as server, Wire(server.guest_link if server.hall else server.link) as page:
         assert wait_until(lambda: bool(server.sessions.learners), LONG)
         (learner,) = server.sessions.learners
         assert wait_until(lambda: learner.status is not None, LONG)
