@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
+import numpy as np
 import psutil
 
 from app.client.simulation_client import SimulationClient
@@ -91,6 +92,18 @@ def begun(start: Start, scene: str = "planar3-hold") -> SimulationClient:
     learner = start(scene)
     assert wait_until(lambda: running(learner), LONG)
     return learner
+
+
+def latest(learner: SimulationClient, field: str) -> np.ndarray:
+    """Returns a field of the newest row of telemetry."""
+    found = learner.read(lambda _, history: history.latest[history.layout.fields[field]].copy())
+    assert found is not None
+    return found
+
+
+def error(learner: SimulationClient, task: str) -> float:
+    """Returns ‖x̃‖ now, m or rad."""
+    return float(np.linalg.norm(latest(learner, f"error/{task}")))
 
 
 def rings() -> int:
