@@ -26,7 +26,6 @@ from viser import __version__
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from app.__main__ import main
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
@@ -321,23 +320,6 @@ def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
     assert place_read(right, start) == step
     assert place_read(right, step) is None
     assert place_read(text.replace('"S"', json.dumps(json.loads(right)["start"])), start) is None
-
-
-def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command also accepts several proxies."""
-    asked: dict[str, Any] = {}
-    monkeypatch.setattr("app.web.server.PageServer", lambda _, options: asked.update(vars(options)))
-    monkeypatch.setattr("app.web.serving.serve", lambda _, **options: 0)
-    first, second = "https://lab.example.org", "https://b.example.org"
-    assert main(["--no-browser", "--trusted-origin", first, "--trusted-origin", second]) == 0
-    assert tuple(asked["trusted_origins"]) == (first, second) and asked["ask_token"]
-    assert asked["own_files"] == Folder.at(".")
-    assert main(["--no-browser", "--no-token", "--no-own-files"]) == 0
-    assert not asked["ask_token"] and asked["own_files"] is None
-    assert main(["--no-browser", "--own-files", str(PAGE.parent)]) == 0
-    assert asked["own_files"] == Folder(PAGE.parent.resolve())
-    assert main(["--no-browser", "--own-files", "/nowhere"]) == 2
-    assert main(["--no-browser", "--own-files", ".", "--no-own-files"]) == 2
 
 
 def test_the_page_names_options_that_exist() -> None:
