@@ -6,6 +6,7 @@ import math
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.resources import files
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -57,6 +58,9 @@ _UNDRAWN = """(() => {
 """Makes the calls that fill the pixels of the page's canvases do nothing. All steps before these calls are
 done as usual: scene, poses, visibility, the search for the object under the mouse, triangles."""
 
+_WCAG = """() => axe.run(document, {
+  runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], resultTypes: ["violations"] })"""
+
 _PICTURES = """() => new Promise((done) => {
   window.setTimeout(done, 60000);
   let left = 3;
@@ -72,6 +76,21 @@ _PROJECT = """([name, at]) => {
   const r = m.canvas.getBoundingClientRect();
   return [r.left + (v.x * 0.5 + 0.5) * r.width, r.top + (-v.y * 0.5 + 0.5) * r.height];
 }"""
+
+
+def load_axe(page: Page) -> None:
+    """Loads axe-core into the page, for `violations`."""
+    page.evaluate((files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8"))
+
+
+def violations(page: Page) -> list[str]:
+    """Returns what axe-core finds against WCAG 2.1 A and AA."""
+    found: Any = page.evaluate(_WCAG)
+    return [
+        f"{each['id']}: {node['html'][:150]} {node['failureSummary'][:200]}"
+        for each in found["violations"]
+        for node in each["nodes"]
+    ]
 
 
 def find_chromium() -> str | None:

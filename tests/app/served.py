@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
+import numpy as np
 import psutil
 
 from app.client.simulation_client import SimulationClient
@@ -43,7 +44,7 @@ def visited(
     choice: SceneChoice | str = "planar3-hold", **options: Any
 ) -> Iterator[tuple[Wire, SimulationClient]]:
     """Runs a server with one page, and yields the page and its simulation, which has begun."""
-    with served(choice, **options) as server, Wire(server.link) as page:
+    with served(choice, **options) as server, Wire(server.guest_link if server.hall else server.link) as page:
         assert wait_until(lambda: bool(server.sessions.learners), LONG)
         (learner,) = server.sessions.learners
         assert wait_until(lambda: learner.status is not None, LONG)
@@ -91,6 +92,18 @@ def begun(start: Start, scene: str = "planar3-hold") -> SimulationClient:
     learner = start(scene)
     assert wait_until(lambda: running(learner), LONG)
     return learner
+
+
+def latest(learner: SimulationClient, field: str) -> np.ndarray:
+    """Returns a field of the newest row of telemetry."""
+    found = learner.read(lambda run: run.latest[run.layout.fields[field]].copy())
+    assert found is not None
+    return found
+
+
+def error(learner: SimulationClient, task: str) -> float:
+    """Returns ‖x̃‖ now, m or rad."""
+    return float(np.linalg.norm(latest(learner, f"error/{task}")))
 
 
 def rings() -> int:

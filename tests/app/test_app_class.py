@@ -19,7 +19,6 @@ from served import LONG, get, served
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from app.__main__ import main
 from app.classes.gathering import Gathering
 from app.classes.sockets import PER_MINUTE, Newcomers
 from app.classes.views import for_teacher
@@ -362,16 +361,6 @@ def test_a_server_without_a_class_has_none_of_its_pages() -> None:
         assert get(f"{server.url}/class")[0] == get(f"{server.url}/v/abcdef")[0] == 403
 
 
-def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: dict[str, Any] = {}
-    monkeypatch.setattr("app.web.server.PageServer", lambda _, options: asked.update(vars(options)))
-    monkeypatch.setattr("app.web.serving.serve", lambda _, **options: 0)
-    for given, names in (([], None), (["--class"], True), (["--class", "--no-names"], False)):
-        assert main(["--no-browser", *given]) == 0
-        assert asked["class_names"] is names
-    assert main(["--no-browser", "--no-names"]) == 2
-
-
 # ---------------------------------------------------------------- guesses at the code
 
 
@@ -501,8 +490,3 @@ def test_an_account_keeps_its_row_and_names_may_be_left_out() -> None:
     assert again.poll is not None and again.poll.latest == {"new": 0}
     nameless = Gathering(named=False).entered("one", "robot", 0.0, "zoe")
     assert "zoe" not in repr(nameless) and for_teacher(nameless, 0.0)["rows"][0]["name"] == ""
-
-
-def test_the_command_asks_for_the_address_of_the_proxy(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--no-browser", "--class", "--proxy-only"]) == 2
-    assert "--trusted-origin https://lab.example.org" in capsys.readouterr().err

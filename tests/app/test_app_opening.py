@@ -10,11 +10,13 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
 from served import LONG, served
 
+from app.__main__ import main
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.web import server as module
@@ -161,3 +163,31 @@ def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.
         monkeypatch.setattr(module, "check_address", lambda *_: None)
         with pytest.raises(InputError, match="is in use"):
             PageServer(FIRST, ServerOptions(port=taken.getsockname()[1], max_sessions=1))
+
+
+def test_the_command_passes_its_options_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The command also accepts several proxies."""
+    asked: dict[str, Any] = {}
+    monkeypatch.setattr("app.web.server.PageServer", lambda _, options: asked.update(vars(options)))
+    monkeypatch.setattr("app.web.serving.serve", lambda _, **options: 0)
+    first, second = "https://lab.example.org", "https://b.example.org"
+    for words, options in (
+        ("", {"class_names": None, "ask_token": True, "own_files": Folder.at(".")}),
+        ("--class", {"class_names": True}),
+        ("--class --no-names", {"class_names": False}),
+        (f"--trusted-origin {first} --trusted-origin {second}", {"trusted_origins": (first, second)}),
+        ("--no-token --no-own-files", {"ask_token": False, "own_files": None}),
+        (f"--own-files {ROOT}", {"own_files": Folder(ROOT)}),
+    ):
+        assert main(["--no-browser", *words.split()]) == 0
+        assert {name: asked[name] for name in options} == options
+    for words in (
+        "--no-names",
+        "--own-files /nowhere",
+        "--own-files . --no-own-files",
+        "--class --proxy-only",
+    ):
+        assert main(["--no-browser", *words.split()]) == 2
+    assert f"--trusted-origin {first}" in capsys.readouterr().err

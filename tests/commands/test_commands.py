@@ -25,13 +25,6 @@ ROOT = Path(__file__).parents[2]
 NO_ROBOT = str(ROOT / "robots" / "meshes")
 
 
-@pytest.fixture
-def broken_urdf(tmp_path: Path) -> str:
-    path = tmp_path / "broken.urdf"
-    path.write_text('<robot name="arm"><link name="base"></robot>')
-    return str(path)
-
-
 WRONG: dict[str, tuple[list[str], str]] = {
     "no such command": (["rnu"], "run"),
     "no such scene": (["run", "iiwa14-hodl"], "iiwa14-hold"),
@@ -91,8 +84,10 @@ def test_wrong_input_gets_one_sentence_and_exit_2(case: str, capfd: pytest.Captu
     assert out.strip() == ""
 
 
-def test_a_broken_urdf_gets_one_sentence(broken_urdf: str, capfd: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "hold", "--urdf", broken_urdf]) == 2
+def test_a_broken_urdf_gets_one_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "broken.urdf"
+    path.write_text('<robot name="arm"><link name="base"></robot>')
+    assert main(["run", "hold", "--urdf", str(path)]) == 2
     err = capfd.readouterr().err
     assert len(err.strip().splitlines()) == 1
     assert "broken.urdf" in err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from importlib import import_module
@@ -27,46 +26,33 @@ assert not set({NUMERICS}) & set(sys.modules), set({NUMERICS}) & set(sys.modules
 """
 
 
-@pytest.mark.parametrize("command", [*(f"{name} --help" for name in COMMANDS), "--help"])
-def test_help_loads_no_numerics(command: str) -> None:
-    done = _watched(command.split())
-    assert done.returncode == 0, done.stderr
-    assert "usage: himpc-lab" in done.stdout
+LISTS = ("scenes", "controllers", "robots")
 
 
-@pytest.mark.parametrize("command", ["scenes", "controllers", "robots"])
-def test_lists_load_no_numerics(command: str) -> None:
-    done = _watched([command])
-    assert done.returncode == 0, done.stderr
-    assert len(done.stdout.splitlines()) > 5
+@pytest.mark.parametrize("command", [*(f"{name} --help" for name in COMMANDS), "--help", *LISTS])
+def test_help_and_lists_load_no_numerics(command: str) -> None:
+    """Help names every command."""
+    printed = _printed(WATCHED, *command.split())
+    if command in LISTS:
+        assert len(printed.splitlines()) > 5
+    else:
+        assert "usage: himpc-lab" in printed
+    if command == "--help":
+        assert all(f"  {name} " in printed and line in printed for name, line in COMMANDS.items())
 
 
-def test_the_plant_looks_for_no_window() -> None:
+def test_the_plant_looks_for_no_window(monkeypatch: pytest.MonkeyPatch) -> None:
     """By default the import of MuJoCo would start processes that look for a window library, and Ctrl-C would
     also reach these processes."""
-    code = """
-import sys
-import app.commands.early, robots.plant
-assert "mujoco" in sys.modules and "glfw" not in sys.modules
-"""
-    environment = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    loads = "import sys, app.commands.early, robots.plant; "
+    _printed(loads + 'assert "mujoco" in sys.modules and "glfw" not in sys.modules')
 
 
 def test_the_papers_jobs_load_no_statistics() -> None:
     """Every process that computes the papers' jobs would load `scipy.stats`, which only the outline of one
     figure needs."""
-    code = "import sys, lessons.papers; assert 'scipy.stats' not in sys.modules"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
-def test_help_names_every_command() -> None:
-    printed = _watched(["--help"]).stdout
-    assert all(f"  {name} " in printed and line in printed for name, line in COMMANDS.items())
+    _printed("import sys, lessons.papers; assert 'scipy.stats' not in sys.modules")
 
 
 @pytest.mark.parametrize("package", ["robots", "himpc", "himpc.controllers", "himpc.htmpc"])
@@ -79,12 +65,9 @@ def test_a_lazy_package_has_all_it_names(package: str) -> None:
         module.Robto  # noqa: B018
 
 
-def _watched(arguments: list[str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", WATCHED, *arguments],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+def _printed(code: str, *arguments: str) -> str:
+    """Returns what a program prints that must not fail."""
+    command = [sys.executable, "-c", code, *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -1,11 +1,8 @@
-"""A classroom: all pages show one robot, and only pages with the token can control it. It is a class as well:
-phones vote, and the teacher's page shows the votes."""
+"""A class in a real browser: phones vote, and the teacher's page shows the votes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib.resources import files
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
@@ -13,13 +10,12 @@ from served import served
 
 from app.link.choice import SceneChoice
 from app.web.server import PageServer, ServerOptions
+from browsing.browser_actions import load_axe, violations
 
-pytestmark = [
-    pytest.mark.nightly(
-        *(f"app/{part}" for part in ("adapter", "classes", "client", "link", "page", "panels/run", "web")),
-        "browsing/",
-    )
-]
+pytestmark = pytest.mark.nightly(
+    *(f"app/{part}" for part in ("adapter", "classes", "client", "link", "page", "panels/run", "web")),
+    "browsing/",
+)
 
 
 @pytest.fixture(scope="module")
@@ -29,14 +25,6 @@ def classroom() -> Iterator[PageServer]:
 
 
 LONG = 120_000  # ms
-_RULES = """() => axe.run(document, {
-  runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], resultTypes: ["violations"] })"""
-
-
-def violations(page: Page) -> list[str]:
-    """Returns what axe-core finds against WCAG 2.1 A and AA."""
-    found: Any = page.evaluate(_RULES)
-    return [f"{each['id']}: {node['html'][:150]}" for each in found["violations"] for node in each["nodes"]]
 
 
 def page_of(browser: Browser, address: str, width: int, height: int, faults: list[str]) -> Page:
@@ -46,7 +34,7 @@ def page_of(browser: Browser, address: str, width: int, height: int, faults: lis
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
     page.goto(address)
-    page.evaluate((files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8"))
+    load_axe(page)
     return page
 
 

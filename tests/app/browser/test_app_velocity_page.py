@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from served import served
+from served import error, latest, served
 
 from app.client.simulation_client import SimulationClient
 from app.link.messages import MissionView, Post
@@ -73,17 +73,6 @@ def learner(server: PageServer, page: Page) -> SimulationClient:
 def mission(learner: SimulationClient) -> MissionView:
     assert learner.status is not None and learner.status.mission is not None
     return learner.status.mission
-
-
-def latest(learner: SimulationClient, field: str) -> np.ndarray:
-    """Returns a field of the newest row of telemetry."""
-    found = learner.read(lambda recording: recording.latest[recording.layout.fields[field]].copy())
-    assert found is not None
-    return found
-
-
-def error(learner: SimulationClient, role: str) -> float:
-    return float(np.linalg.norm(latest(learner, f"error/{role}")))
 
 
 def goal(learner: SimulationClient, place: int) -> np.ndarray:

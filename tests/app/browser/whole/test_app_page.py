@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
+from served import error
 
 from app.adapter import private
 from app.adapter.private import ThreadSafeEvent
@@ -50,14 +51,6 @@ def learner(server: PageServer, page: Page) -> SimulationClient:
     """Returns the simulation of `page`."""
     assert eventually(page, lambda: bool(server.sessions.learners) and server.sessions.learners[0].attached)
     return server.sessions.learners[0]
-
-
-def error(learner: SimulationClient, task: str) -> float:
-    """Returns ‖x̃‖ now, m or rad."""
-    row = learner.read(lambda recording: (recording.layout, recording.latest))
-    assert row is not None
-    layout, latest = row
-    return float(np.linalg.norm(latest[layout.fields[f"error/{task}"]]))
 
 
 def test_the_page_invites_and_holds(page: Page, learner: SimulationClient) -> None:
