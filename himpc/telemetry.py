@@ -9,26 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from himpc.cascade.level import FALLBACKS
-from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
+from himpc.constants import AT_TORQUE
 from himpc.kinematics.configuration import Configuration
 from himpc.stack import DAMPING_LEVEL, Stack
 from robots import Robot
 from robots.arrays import Array
-
-__all__ = [
-    "AT_ACCELERATION",
-    "AT_POSITION",
-    "AT_TORQUE",
-    "AT_VELOCITY",
-    "TORQUE_ROW",
-    "VELOCITY_ROW",
-    "Layout",
-    "RowFields",
-    "TaskInfo",
-    "layout_of",
-    "relaid",
-    "velocity_layout_of",
-]
 
 AT_ACCELERATION = AT_TORQUE
 """Bit of `at_bound`: at velocity level the input is the acceleration, at torque level it is the torque."""

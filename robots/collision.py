@@ -12,9 +12,10 @@ import pinocchio as pin
 
 from robots.arrays import Array, Indices, Mask
 from robots.errors import InputError
+from robots.geometry import Point, point
+from robots.joints import chain_length
 from robots.robot import Robot
 
-Point = tuple[float, float, float]
 FLOOR, BALL, BOX, CAPSULE = range(4)
 """Kinds of shapes."""
 
@@ -203,11 +204,11 @@ class Sphere(NamedTuple):
     """A ball fixed to a link: centre in the link's frame, m, and radius, m."""
 
     link: str
-    centre: tuple[float, float, float]
+    centre: Point
     radius: float
 
 
-def _row(link: str, points: tuple[tuple[float, float, float], ...], radius: float) -> tuple[Sphere, ...]:
+def _row(link: str, points: tuple[Point, ...], radius: float) -> tuple[Sphere, ...]:
     return tuple(Sphere(link, point, radius) for point in points)
 
 
@@ -244,7 +245,7 @@ def _along_links(robot: Robot) -> tuple[Sphere, ...]:
     chain = [joint for joint in model.supports[tip.parentJoint] if joint > 0]
     ends = [np.asarray(model.jointPlacements[joint].translation) for joint in chain[1:]]
     ends.append(np.asarray(tip.placement.translation))
-    radius = _SLENDER * max(sum(float(np.linalg.norm(end)) for end in ends), 0.05)
+    radius = _SLENDER * max(chain_length(model, robot.frame_id(robot.tip)), 0.05)
     spheres: list[Sphere] = []
     for joint, end in zip(chain, ends, strict=True):
         link = next((n for n in robot.frames if model.frames[robot.frame_id(n)].parentJoint == joint), None)
@@ -253,6 +254,5 @@ def _along_links(robot: Robot) -> tuple[Sphere, ...]:
         inverse = model.frames[robot.frame_id(link)].placement.inverse()
         steps = max(1, int(np.ceil(float(np.linalg.norm(end)) / radius)))
         for k in range(1, steps + 1):
-            x, y, z = inverse.act(end * (k / steps))
-            spheres.append(Sphere(link, (float(x), float(y), float(z)), radius))
+            spheres.append(Sphere(link, point(inverse.act(end * (k / steps))), radius))
     return tuple(spheres)

@@ -13,6 +13,14 @@ from typing import Any, Literal, TypeVar, get_args, get_type_hints
 import numpy as np
 
 Point = tuple[float, float, float]
+
+
+def point(numbers: np.ndarray) -> Point:
+    """Returns an array of three numbers as a point."""
+    x, y, z = numbers
+    return float(x), float(y), float(z)
+
+
 SolidKind = Literal["box", "sphere", "cylinder", "capsule", "hull"]
 Why = Literal["neighbours", "home", "always", "hollow", "cover"]
 Source = Literal["collision", "hull", "capsule"]

@@ -72,3 +72,11 @@ def _motion(model: pin.Model, joint: int) -> tuple[bool, Array, float]:
     prismatic = bool(np.abs(along).max() > np.abs(about).max())
     found = along if prismatic else about
     return prismatic, found, 1.0 if model.nvs[joint] == 1 else float(np.linalg.norm(found))
+
+
+def chain_length(model: pin.Model, frame: int, from_world: bool = False) -> float:
+    """Returns the length of the chain from the first joint, or from the world's origin, through all joints to
+    a frame with this index, m."""
+    joints = [joint for joint in model.supports[model.frames[frame].parentJoint] if joint > 0]
+    steps = [model.jointPlacements[joint].translation for joint in (joints if from_world else joints[1:])]
+    return sum(float(np.linalg.norm(step)) for step in (*steps, model.frames[frame].placement.translation))

@@ -15,7 +15,6 @@ from robots.settings import PerJoint, PlantSettings
 from robots.signals import Motors, PlantState, as_vector
 
 Mode = Literal["ideal", "servo"]
-MODES: tuple[Mode, ...] = ("ideal", "servo")
 
 _STEP = 1e-3  # s, control period of the servos
 

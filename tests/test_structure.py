@@ -263,7 +263,7 @@ ROBOTS = {
     ),
     "truth": ("robot", "joints", "settings"),
     "nominal": ("arrays", "truth", "robot", "inertia", "settings", "ranges"),
-    "collision": ("arrays", "robot", "errors"),
+    "collision": ("arrays", "joints", "geometry", "robot", "errors"),
     "world": ("collision", "ranges", "errors"),
     "cover_shapes": ("arrays", "collision", "per_robot", "robot", "geometry"),
     "shapes": ("arrays", "joints", "truth", "per_robot", "robot", "geometry", "meshes"),

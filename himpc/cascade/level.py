@@ -21,7 +21,7 @@ class LevelProblem(NamedTuple):
     Attributes:
         name: the level's stable identity.
         B: (N, m, n), Ĵ^j M̄⁻¹ at every knot.
-        C: (N, m, N), effect coefficients of `prediction.task.ResidualModel`.
+        C: (N, m, N), effect coefficients of `prediction.ResidualModel`.
         free: (N, m), the free response: e for U = 0.
         root_Q: (m,), √Q.
         R: (n,), weight of the increments.

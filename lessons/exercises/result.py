@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,6 @@ def as_data(grade: Grade) -> dict[str, Any]:
 
 
 Format = Literal["gradescope", "github"]
-FORMATS: tuple[Format, ...] = get_args(Format)
 Visibility = Literal["visible", "hidden", "after_due_date", "after_published"]
 
 

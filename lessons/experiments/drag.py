@@ -19,7 +19,7 @@ from robots import Robot
 from robots.arrays import Array
 from robots.covering.covers import near
 from robots.errors import listed, shortened
-from robots.loading.home import chain_length
+from robots.joints import chain_length
 from robots.plant import Plant
 from robots.reach import ReachJudge
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from himpc.constants import AT_POSITION, AT_VELOCITY
 from himpc.htmpc import VelocityPlan, base_joints
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import AtOnce, Plan
@@ -13,7 +14,7 @@ from himpc.plan.row import as_numbers, write_levels, write_reference
 from himpc.references import Reference
 from himpc.stack import Stack
 from himpc.tasks import Task
-from himpc.telemetry import AT_ACCELERATION, AT_POSITION, AT_VELOCITY, Layout
+from himpc.telemetry import AT_ACCELERATION, Layout
 from robots.arrays import Array
 
 

@@ -9,7 +9,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY
+from himpc.constants import AT_POSITION, AT_TORQUE, AT_VELOCITY
 from robots.arrays import Array
 
 Statistic = Literal["largest", "smallest", "rms", "mean", "range", "last", "sum"]

@@ -15,7 +15,7 @@ import numpy as np
 from robots.arrays import Array, Indices, Mask
 from robots.covering.capsule_fit import Fit, quick_fits, reach, tight_fit
 from robots.covering.covered import Patch
-from robots.geometry import Capsule
+from robots.geometry import Capsule, point
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
@@ -333,13 +333,8 @@ def _made(body: Body, cuts: tuple[Cut, ...]) -> Found:
     parts = [group == k for k in np.unique(group)]
     tight = [tight_fit(body.corners[part].reshape(-1, 3), np.repeat(body.swells[part], 3)) for part in parts]
     capsules = [
-        Capsule(body.joint, body.name(part), _point(fit.start), _point(fit.end), float(fit.radius))
+        Capsule(body.joint, body.name(part), point(fit.start), point(fit.end), float(fit.radius))
         for part, fit in zip(parts, tight, strict=True)
     ]
     fits = Fit(*(np.array(each) for each in zip(*tight, strict=True)))
     return Found(cuts, capsules, body.excess(fits))
-
-
-def _point(values: Array) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

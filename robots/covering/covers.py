@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from robots.covering.covered import patches
 from robots.covering.covering import covering
-from robots.geometry import Capsule, CollisionModel, Cover, Excluded, Solid
+from robots.geometry import Capsule, CollisionModel, Cover, Excluded, Solid, point
 from robots.mechanics.exclusions import Bodies, collision_model, touching, touching_often
 from robots.per_robot import per_robot
 from robots.robot import Robot
@@ -100,11 +100,11 @@ def as_solid(capsule: Capsule) -> Solid:
     """Returns a capsule of a cover as a solid of the plant."""
     start, end = np.array(capsule.start), np.array(capsule.end)
     length = float(np.linalg.norm(end - start))
-    x, y, z = (float(value) for value in 0.5 * (start + end))
+    middle = point(0.5 * (start + end))
     if length < 1e-6:
         size: tuple[float, ...] = (capsule.radius,)
-        return Solid(capsule.joint, capsule.link, "sphere", "capsule", size, (x, y, z))
+        return Solid(capsule.joint, capsule.link, "sphere", "capsule", size, middle)
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (end - start) / length)
     i, j, k, w = (float(value) for value in turn.coeffs())
     size = capsule.radius, 0.5 * length
-    return Solid(capsule.joint, capsule.link, "capsule", "capsule", size, (x, y, z), (w, i, j, k))
+    return Solid(capsule.joint, capsule.link, "capsule", "capsule", size, middle, (w, i, j, k))

@@ -12,7 +12,7 @@ from lxml import etree
 
 from robots.catalog import CatalogEntry
 from robots.covering.covers import checked
-from robots.geometry import Capsule, CollisionModel, Cover, Excluded, Point, Solid, stored
+from robots.geometry import Capsule, CollisionModel, Cover, Excluded, Point, Solid, point, stored
 from robots.joints import joint_names
 from robots.loading.importing import Import, bounds
 from robots.mechanics.exclusions import collision_model
@@ -107,7 +107,7 @@ def _solid(solid: Solid, places: Places) -> Solid:
         joint=joint,
         position=_point(place, solid.position),
         quaternion=(float(real), float(i), float(j), float(k)),
-        points=tuple(_point(place, point) for point in solid.points),
+        points=tuple(_point(place, corner) for corner in solid.points),
     )
 
 
@@ -116,9 +116,8 @@ def _capsule(capsule: Capsule, places: Places) -> Capsule:
     return replace(capsule, joint=joint, start=_point(place, capsule.start), end=_point(place, capsule.end))
 
 
-def _point(place: pin.SE3, point: Point) -> Point:
-    x, y, z = place.act(np.array(point))
-    return float(x), float(y), float(z)
+def _point(place: pin.SE3, at: Point) -> Point:
+    return point(place.act(np.array(at)))
 
 
 def _last_the_base(shape: Solid | Capsule) -> tuple[bool, int]:

@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from robots.inertia import finite_range, mass_matrix, sample_configurations
+from robots.joints import chain_length
 
 _CANDIDATES = 300
 _STEPS = 60
@@ -111,10 +112,3 @@ def sensible_a_max(
         gravity = np.abs(pin.computeGeneralizedGravity(model, data, q))
         accelerations.append((tau_limit - gravity) / np.diag(mass_matrix(model, data, q)))
     return np.clip(0.5 * np.min(accelerations, axis=0), 1.0, 15.0)
-
-
-def chain_length(model: pin.Model, frame: int) -> float:
-    """Returns the length of the chain from the first joint to the frame, m."""
-    chain = [joint for joint in model.supports[model.frames[frame].parentJoint] if joint > 0][1:]
-    lengths = [float(np.linalg.norm(model.jointPlacements[joint].translation)) for joint in chain]
-    return sum(lengths) + float(np.linalg.norm(model.frames[frame].placement.translation))

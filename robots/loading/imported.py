@@ -15,12 +15,12 @@ from robots.covering.covers import made_cover, own_pairs
 from robots.errors import listed
 from robots.floor import no_floor, stands
 from robots.geometry import CollisionModel, Cover
+from robots.joints import chain_length
 from robots.loading.home import find_home
 from robots.mechanics.exclusions import collision_model, lowest
 from robots.report import Finding
 from robots.robot import Robot
 from robots.shapes.collision_shapes import collision_solids
-from robots.shapes.limbs import chain_length
 from robots.shapes.read import DescribedShape, described_shapes, mesh_surfaces
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _about_meshes(robot: Robot) -> tuple[float | None, list[Finding]]:
     if missing:
         text = f"{len(missing)} mesh file(s) could not be read ({listed(missing)})"
         findings.append(Finding("note", "meshes", text))
-    reach = chain_length(robot.model, robot.frame_id(robot.tip))
+    reach = chain_length(robot.model, robot.frame_id(robot.tip), from_world=True)
     for link, size in _sizes(shapes, surfaces).items():
         if size > WRONG_SIZE[1] * reach:
             text = (

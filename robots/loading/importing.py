@@ -15,8 +15,8 @@ from lxml.etree import _Element as Element
 
 from robots.errors import InputError
 from robots.inertia import SLOW, mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
-from robots.joints import joint_names
-from robots.loading.home import chain_length, find_home, sensible_a_max
+from robots.joints import chain_length, joint_names
+from robots.loading.home import find_home, sensible_a_max
 from robots.loading.imported import with_collision
 from robots.meshes.files import has_meshes
 from robots.plant import Plant

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from robots.geometry import Point, Solid, SolidKind, Source, directions
+from robots.geometry import Solid, SolidKind, Source, directions, point
 from robots.robot import Robot
 from robots.shapes.limbs import limbs
 from robots.shapes.read import DescribedShape, described_shapes, mesh_surfaces
@@ -138,8 +138,7 @@ def _hull(shape: DescribedShape, source: Source, clouds: list[np.ndarray]) -> So
         corners = corners[ConvexHull(corners).vertices]
     except QhullError:
         return None
-    points: list[Point] = [(float(x), float(y), float(z)) for x, y, z in corners]
-    return Solid(shape.joint, shape.link, "hull", source, points=tuple(points))
+    return Solid(shape.joint, shape.link, "hull", source, points=tuple(map(point, corners)))
 
 
 def _directions() -> np.ndarray:

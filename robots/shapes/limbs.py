@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from robots.joints import chain_length
+
 Colour = tuple[int, int, int]
 BODY: Colour = (222, 226, 231)
 DRUM: Colour = (74, 82, 94)
@@ -89,12 +91,5 @@ def joint_radius(model: pin.Model, tip: int, joint: int) -> float:
     return thickness * (1.0 - 0.4 * depth / max(deepest, 1))
 
 
-def chain_length(model: pin.Model, tip: int) -> float:
-    """Returns the length of the chain from the world to a frame, through all its joints, m."""
-    frame = model.frames[tip]
-    steps = [model.jointPlacements[k].translation for k in model.supports[frame.parentJoint] if k > 0]
-    return sum(float(np.linalg.norm(step)) for step in (*steps, frame.placement.translation))
-
-
 def _thickness(model: pin.Model, tip: int) -> float:
-    return _SLENDER * max(chain_length(model, tip), 0.05)
+    return _SLENDER * max(chain_length(model, tip, from_world=True), 0.05)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from session_rows import field, rows_of
 
-from himpc.telemetry import AT_TORQUE
+from himpc.constants import AT_TORQUE
 from lessons.events import Event, MoveLevel, MoveTarget, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.scene import TorqueScene

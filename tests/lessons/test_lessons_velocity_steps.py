@@ -8,8 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from himpc.constants import AT_VELOCITY
 from himpc.htmpc import HTMPC, VelocityPlan
-from himpc.telemetry import AT_ACCELERATION, AT_VELOCITY
+from himpc.telemetry import AT_ACCELERATION
 from lessons.events import Event, MoveLevel, MoveTarget, Reset, Set
 from lessons.scenes.catalog import as_torque_scene, load_scene, prepared
 from lessons.scenes.run_spec import RunSpec

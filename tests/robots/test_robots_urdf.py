@@ -11,7 +11,7 @@ import pytest
 from arms import INERTIAL, LIMIT, joint, link, load, robot, two_joint_arm
 
 from robots import InputError, Robot, check_urdf, load_robot
-from robots.loading.home import chain_length
+from robots.joints import chain_length
 from robots.loading.importing import import_robot
 from robots.mechanics.exclusions import lowest
 from robots.meshes.files import installed_shares

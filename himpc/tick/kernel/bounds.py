@@ -37,7 +37,7 @@ class LevelBounds(NamedTuple):
 
 @inline_kernel
 def viable_speed(room: float, v_limit: float, a_max: float, reaction: float) -> float:
-    """Returns the speed from which a joint can still stop within `room`, see `limits.viability`. Beyond the
+    """Returns the speed from which a joint can still stop within `room`, see `limits.velocity`. Beyond the
     limit, it returns the negative speed at which the joint must return."""
     inside = max(room, 0.0)
     reach = min(v_limit, a_max * (math.sqrt(reaction * reaction + (2.0 / a_max) * inside) - reaction))

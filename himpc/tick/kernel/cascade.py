@@ -141,7 +141,7 @@ def prepare_bounds(
 def predict(
     q: Array, v: Array, v_was: Array, U: Array, M_bar: Array, period: float, T_s: float, path: Array
 ) -> None:
-    """Computes q at knots 0 … N under the increments, (N+1, n), by (18), see `prediction.joint`."""
+    """Computes q at knots 0 … N under the increments, (N+1, n), by (18), see `himpc.prediction`."""
     for a in range(q.size):
         position, speed, acceleration = q[a], v[a], (v[a] - v_was[a]) / period
         path[0, a] = position

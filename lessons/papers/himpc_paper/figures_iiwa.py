@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from himpc.telemetry import AT_POSITION
+from himpc.constants import AT_POSITION
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.curves import banded, by_controller, curve, excerpt, spans
 from lessons.papers.himpc_paper.iiwa import (
