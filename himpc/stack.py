@@ -83,18 +83,6 @@ def about(task: Task) -> Task:
     return replace(task, axes=AXES) if isinstance(task, OnAxes) else task
 
 
-def active_levels(stack: Stack, damping: bool, freedom: int) -> Stack:
-    """Returns the levels that a controller solves, highest priority first.
-
-    Args:
-        stack: all levels.
-        damping: whether the damping level may be added as the last level.
-        freedom: number of directions that the enabled levels leave free (`freedom_left`).
-    """
-    enabled = tuple(level for level in stack if level.enabled)
-    return (*enabled, DAMPING_LEVEL) if damping and freedom else enabled
-
-
 DAMPING_LEVEL = Level((Damping(name="damping"),), Q=200.0, R=10.0)
 
 

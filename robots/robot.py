@@ -54,7 +54,7 @@ class Robot:
             values.flags.writeable = False
             object.__setattr__(self, name, values)
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of joints that do not follow others."""
         return self.model.nv

@@ -15,13 +15,12 @@ from himpc.controllers.base import TorqueController
 from himpc.controllers.printed_tick import PrintedTick
 from himpc.controllers.stall_guard import guard_of
 from himpc.formulation.forms import LevelForm, Prepared, prepare, usable
-from himpc.formulation.settings import Settings, check_solver
+from himpc.formulation.settings import Settings, check_solver, same_structure
 from himpc.limits import LimitsInForce, build_rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.prediction import JointState
 from himpc.references import Preview
 from himpc.stack import DAMPING_LEVEL, about
-from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
 
 Array = NDArray[np.float64]
@@ -40,6 +39,7 @@ class HIMPC(TorqueController):
     the prediction). `configure` changes settings and keeps these data.
     """
 
+    _prepared: Prepared | None = None
     solves = False
     """Whether a general QP solver is used, the one in `Settings.solver`."""
 
@@ -47,7 +47,7 @@ class HIMPC(TorqueController):
     def problems(self) -> list[LevelProblem]:
         """The problems of the last tick, one per level, highest priority first; empty if no level is enabled
         or no tick has been solved."""
-        return [] if self._idle else self.kernel.problems()
+        return [] if self._prepared is None or self._prepared.idle else self.kernel.problems()
 
     def reset(self, tau_0: Array) -> None:
         """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
@@ -60,31 +60,37 @@ class HIMPC(TorqueController):
     def configure(self, settings: Settings) -> None:
         """Applies new settings immediately. If they do not fit the robot, it raises InputError and changes
         nothing."""
-        before = [about(task) for task in self._form.tasks]
+        form, kernel = self._form, self.kernel
         same = settings.M_bar == self._settings.M_bar and settings.T_s == self._settings.T_s
         measured_so_far = self._adaptation if same and settings.M_bar_adapt else None
-        memory = self.kernel.memory
         self._apply(settings)
         self._adaptation = measured_so_far
+        self._weight = {name: weight for name, weight in self._weight.items() if weight < 1.0}
+        if self.kernel is kernel:
+            return
+        memory = kernel.memory
         if memory is not None:
             self.kernel.recall(memory, memory.q, memory.v)
-        self._weight = {name: weight for name, weight in self._weight.items() if weight < 1.0}
-        for form in self._form.levels:
-            for task in form.level.tasks:
-                if form.level is not DAMPING_LEVEL and about(task) not in before:
+        before = [about(task) for task in form.tasks]
+        for level in self._form.levels:
+            for task in level.level.tasks:
+                if level.level is not DAMPING_LEVEL and about(task) not in before:
                     self._weight[task.name] = 0.0
 
     def _apply(self, settings: Settings) -> None:
         check_solver(settings, self.solves)
-        prepared = prepare(self.robot, settings)
-        goal = in_force(self.robot, settings.limits)
+        before = self._prepared if same_structure(settings, self._settings) else None
+        prepared = prepare(self.robot, settings, before)
+        same = before is not None and settings.limits == self._settings.limits
+        goal = self._goal if same else in_force(self.robot, settings.limits)
         guard = guard_of(settings, len(prepared.form.tasks), self.robot)
         load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
-        kernel = self._compile(settings, prepared)
+        kernel = self._compile(settings, prepared) if before is None else self.kernel
         # Everything that may raise is above.
-        self._form, self._idle, self._off = prepared
+        if before is not None:
+            kernel.change(settings, prepared)
+        self._prepared, self._form, self.kernel = prepared, prepared.form, kernel
         self._settings, self._goal, self._guard, self._load = settings, goal, guard, load
-        self.kernel = kernel
         self._M_bar = self._M_bar_set = np.array(settings.M_bar)
         # A joint's torque cannot exceed its limit. A larger reading is wrong, and bounds must not start from
         # it.
@@ -92,8 +98,7 @@ class HIMPC(TorqueController):
 
     def _compile(self, settings: Settings, prepared: Prepared) -> CompiledTick | PrintedTick:
         """Creates the tick that solves the levels."""
-        levels = [] if prepared.idle else [LevelTable.of(level) for level in prepared.form.levels]
-        return CompiledTick(self.robot, settings, prepared.form, prepared.off, levels)
+        return CompiledTick(self.robot, settings, prepared)
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None

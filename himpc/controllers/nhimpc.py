@@ -5,7 +5,6 @@ from __future__ import annotations
 from himpc.controllers.himpc import HIMPC
 from himpc.formulation.forms import Prepared
 from himpc.formulation.settings import Settings
-from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
 from robots import Robot
 
@@ -46,7 +45,5 @@ class NHIMPC(HIMPC):
         super().__init__(robot, settings)
 
     def _compile(self, settings: Settings, prepared: Prepared) -> CompiledTick:
-        form, idle, off = prepared
-        levels = [] if idle else [LevelTable.of(level) for level in form.levels]
-        most = self.max_iterations if levels else 1
-        return CompiledTick(self.robot, settings, form, off, levels, self.tolerance, most)
+        most = 1 if prepared.idle else self.max_iterations
+        return CompiledTick(self.robot, settings, prepared, tolerance=self.tolerance, most=most)

@@ -102,7 +102,7 @@ class OneStepController(TorqueController):
         kinematics = Kinematics(self.robot, prepared.form, prepared.off) if known else None
         self._adopt(settings)
         # Everything that may raise is above.
-        self._form, self._idle, self._off = prepared
+        self._form, self._idle, self._off = prepared[:3]
         self._goal, self._kinematics = goal, kinematics
         most = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._reach = most if self.clips else np.full(self.robot.n, np.inf)

@@ -38,15 +38,19 @@ class PrintedTick:
 
     def __init__(self, robot: Robot, settings: Settings, prepared: Prepared) -> None:
         """Raises InputError if the settings do not fit the robot."""
-        self._settings, self._form = settings, prepared.form
         self._viewer = Viewer(robot, settings, prepared)
-        self._M_bar = np.array(settings.M_bar)
-        self._shares: list[float | Array] = [1.0] * len(prepared.form.levels)
-        self._pull = settings.limits.avoidance.largest_error
-        self._problems: list[LevelProblem] = []
         self._progress = np.zeros(len(prepared.form.tasks)), 0.0
         self._predicted: Array | None = None
         self._solutions: dict[str, LevelSolution] = {}
+        self.change(settings, prepared)
+
+    def change(self, settings: Settings, prepared: Prepared) -> None:
+        """Takes the numbers of settings of the same structure, see `same_structure`."""
+        self._settings, self._form = settings, prepared.form
+        self._viewer.change(settings, prepared.form)
+        self._M_bar, self._pull = np.array(settings.M_bar), settings.limits.avoidance.largest_error
+        self._shares: list[float | Array] = [1.0] * len(prepared.form.levels)
+        self._problems: list[LevelProblem] = []
 
     @property
     def memory(self) -> Memory | None:

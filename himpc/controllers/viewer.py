@@ -43,12 +43,18 @@ class Viewer:
         """Raises InputError if the settings do not fit the robot."""
         self._robot, self._settings = robot, settings
         self._data, self._elsewhere = robot.model.createData(), robot.model.createData()
-        self.form, self._idle, self._off = prepared
+        self.form, self._idle, self._off = prepared[:3]
         self._nominal = NominalModel(robot, settings.nominal)
         avoidance = settings.limits.avoidance
         self.distances = Distances(robot, avoidance) if avoidance.on else None
         self.memory: Memory | None = None
         self._along: tuple[Array, Array] | None = None
+
+    def change(self, settings: Settings, form: StackForm) -> None:
+        """Takes the numbers of settings of the same structure, see `same_structure`."""
+        self._settings, self.form = settings, form
+        if self.distances is not None:
+            self.distances.change(settings.limits.avoidance)
 
     @property
     def first(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from himpc.formulation.settings import Settings
 from himpc.limits import Rows
 from himpc.stack import DAMPING_LEVEL
 from himpc.tick.problems import increments_of
-from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
 
 Array = NDArray[np.float64]
@@ -39,26 +38,17 @@ class Weighted(HIMPC):
     """
 
     def _compile(self, settings: Settings, prepared: Prepared) -> CompiledTick:
-        form, idle, off = prepared
-        levels = [] if idle else list(accumulated(form.levels))
-        tick = CompiledTick(self.robot, settings, form, off, levels)
-        for index, level in enumerate(form.levels):
+        return CompiledTick(self.robot, settings, prepared, alone=True)
+
+    def _apply(self, settings: Settings) -> None:
+        super()._apply(settings)
+        for index, level in enumerate(self._form.levels):
             if level.name == DAMPING_LEVEL.name:
-                tick.fade(index, math.sqrt(DAMPING_SHARE))
-        return tick
+                self.kernel.fade(index, math.sqrt(DAMPING_SHARE))
 
     def _faded(self, level: LevelForm) -> float | Array:
         share = super()._faded(level)
         return math.sqrt(DAMPING_SHARE) * share if level.name == DAMPING_LEVEL.name else share
-
-
-def accumulated(levels: Sequence[LevelForm]) -> Iterator[LevelTable]:
-    """Returns, for every p, the problem whose cost is the sum over levels 1 … p. Its evidence is that of
-    level p."""
-    R, knots = np.zeros_like(levels[0].R), 0
-    for level in levels:
-        R, knots = R + level.R, max(knots, level.knots)
-        yield LevelTable(slice(0, level.rows.stop), knots, R, level.rows, level.knots, level.R, alone=True)
 
 
 def sum_of_costs(problems: Sequence[LevelProblem]) -> LevelProblem:

@@ -6,13 +6,13 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 
 from himpc.controllers.controller import Controller
 from himpc.controllers.nhimpc import NHIMPC
-from himpc.controllers.weighted import DAMPING_SHARE, Weighted, accumulated
+from himpc.controllers.weighted import DAMPING_SHARE, Weighted
 from himpc.export.entries import (
     ARRAYS,
     DIGEST,
@@ -60,7 +60,7 @@ from himpc.tick.configure import Span, arena_for, write_curve, write_limits
 from himpc.tick.distances import Distances, carried, pair_memory
 from himpc.tick.kernel.arena import Arena, laid_out
 from himpc.tick.kernel.arrays import NUMBERS, WHOLES, Array, TickArrays
-from himpc.tick.tables import LevelTable, budget_of
+from himpc.tick.tables import budget_of, write_numbers
 from robots import InputError, Robot
 
 _LINE = 64
@@ -110,26 +110,26 @@ def image_of(
     settings = controller.settings
     check(controller, settings)
     strict = not isinstance(controller, Weighted)
-    form, off, tables = _exported_levels(robot, settings, strict)
-    arena, spans = arena_for(robot, settings, form, off, tables)
+    form, off = _exported_levels(robot, settings, strict)
+    count = len(form.levels)
+    arena, spans = arena_for(robot, settings, form, off, count)
+    write_numbers(arena, settings, form, alone=not strict)
     force = in_force(robot, settings.limits)
     write_limits(arena, force, settings.limits.position == "paper")
     arena.f["direction"][:] = np.eye(robot.n)
-    sizes = sizes_of(
-        robot.n, settings.horizon, len(arena.f["K_p"]), len(tables), len(spans), len(arena.f["L"])
-    )
+    sizes = sizes_of(robot.n, settings.horizon, len(arena.f["K_p"]), count, len(spans), len(arena.f["L"]))
     loop, loop_where, f = laid_out(SHAPES, sizes._asdict(), np.float64)
     f["setup"][[MOST, TOLERANCE]] = (
         (controller.max_iterations, controller.tolerance) if isinstance(controller, NHIMPC) else (1, np.inf)
     )
     f["setup"][[ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE]] = (
-        *(settings.R_on == "acceleration", len(tables), strict and settings.damping),
+        *(settings.R_on == "acceleration", count, strict and settings.damping),
         *(budget_of(arena) if budget is None else budget, strict),
     )
     far = np.inf if np.isinf(multiple) else 0.0
     f["widest"][:2] = multiple * robot.tau_limit, multiple * robot.v_limit
     f["widest"][2:] = robot.q_lower - far, robot.q_upper + far
-    f["order"][:] = f["solved_index"][:] = np.arange(len(tables))
+    f["order"][:] = f["solved_index"][:] = np.arange(count)
     f["goal"][:], f["tau_limit"][:], f["weight"][:] = arena.f["limits"], robot.tau_limit, 1.0
     for index, level in enumerate(form.levels):
         calmed = DAMPING_SHARE if level.name == DAMPING_LEVEL.name and not strict else 1.0
@@ -174,16 +174,9 @@ def image_of(
     return Image(memory, named | made | {"arrays": _listed(arena, f, loop_where, offsets)})
 
 
-class ExportedLevels(NamedTuple):
-    """The levels to export, the tasks that are off, and the tables of the levels."""
-
-    form: StackForm
-    off: list[Task]
-    tables: list[LevelTable]
-
-
-def _exported_levels(robot: Robot, settings: Settings, strict: bool) -> ExportedLevels:
-    """Returns the levels to export: for a strict hierarchy all levels, otherwise the enabled levels."""
+def _exported_levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, list[Task]]:
+    """Returns the levels to export, for a strict hierarchy all levels, otherwise the enabled levels; and the
+    tasks that are off."""
     if strict:
         levels = (*settings.stack, DAMPING_LEVEL) if settings.damping else settings.stack
         if len(levels) > _MOST_LEVELS:
@@ -192,12 +185,11 @@ def _exported_levels(robot: Robot, settings: Settings, strict: bool) -> Exported
             )
         if not levels:
             raise InputError("the stack is empty and damping is off: export needs at least one level")
-        form = stack_form(robot, levels, settings)
-        return ExportedLevels(form, [], [LevelTable.of(level) for level in form.levels])
-    form, idle, off = prepare(robot, settings)
+        return stack_form(robot, levels, settings), []
+    form, idle, off = prepare(robot, settings)[:3]
     if idle:
         raise InputError("no level is enabled and damping is off: switch one level on to export it")
-    return ExportedLevels(form, off, list(accumulated(form.levels)))
+    return form, off
 
 
 def _damped(robot: Robot, settings: Settings) -> list[float]:

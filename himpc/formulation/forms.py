@@ -17,7 +17,7 @@ from himpc.kinematics.configuration import Configuration
 from himpc.prediction import ResidualModel, residual_model
 from himpc.references import Later, Preview
 from himpc.references.curves import still
-from himpc.stack import DAMPING_LEVEL, Level, active_levels, freedom_left
+from himpc.stack import DAMPING_LEVEL, Level, freedom_left
 from himpc.tasks import Damping, FramePosition, Task
 from robots import InputError, Robot
 
@@ -36,7 +36,6 @@ class LevelForm:
         rows: its rows among the rows of all levels.
         C: (N, m, N), effect coefficients.
         root_Q: (m,), √Q.
-        weighted_C: (K, m, K), √Q C over the level's own knots.
         R: (n,), in the weight's unit.
         knots: the level's own horizon K ≤ N.
         sizes: number of rows of each of its tasks.
@@ -47,7 +46,6 @@ class LevelForm:
     rows: slice
     C: Array
     root_Q: Array
-    weighted_C: Array
     R: Array
     knots: int
     sizes: tuple[int, ...]
@@ -70,14 +68,12 @@ class StackForm:
         tasks: their tasks in the order of the rows.
         sizes: number of rows of each task.
         model: coefficients of the residual for all rows.
-        root_Q: √Q of all rows, (m,).
     """
 
     levels: tuple[LevelForm, ...]
     tasks: tuple[Task, ...]
     sizes: tuple[int, ...]
     model: ResidualModel
-    root_Q: Array
 
     def jacobian(self, configuration: Configuration) -> Array:
         """Returns Ĵ of all rows at every knot, (N, m, n)."""
@@ -170,52 +166,47 @@ def measure(
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def stack_form(robot: Robot, levels: Sequence[Level], settings: Settings) -> StackForm:
-    """Prepares the levels.
+Counts = Sequence[tuple[int, ...]]
+"""The number of rows of each task of each level."""
+
+
+def _counts(robot: Robot, levels: Sequence[Level]) -> Counts:
+    home = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
+    return [tuple(task.jacobian(home).shape[1] for task in level.tasks) for level in levels]
+
+
+def stack_form(
+    robot: Robot, levels: Sequence[Level], settings: Settings, counts: Counts | None = None
+) -> StackForm:
+    """Prepares the levels. counts: their numbers of rows, if these are known.
 
     Raises:
         InputError: a frame or joint is unknown, or a gain or weight has the wrong length.
     """
-    configuration = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
-    N = settings.horizon
+    N, counts = settings.horizon, _counts(robot, levels) if counts is None else counts
+    tasks = tuple(task for level in levels for task in level.tasks)
+    sizes = tuple(size for own in counts for size in own)
+    K_p, K_v = (
+        np.concatenate(
+            [
+                _spread(getattr(task, name), m, f"{name} of task '{task.name}'")
+                for task, m in zip(tasks, sizes, strict=True)
+            ]
+        )
+        for name in ("K_p", "K_v")
+    )
+    model = residual_model(K_p, K_v, N, settings.T_s)
     forms: list[LevelForm] = []
-    K_p: list[Array] = []
-    K_v: list[Array] = []
-    start = 0
-    for level in levels:
-        first = len(K_p)
-        for task in level.tasks:
-            m = task.jacobian(configuration).shape[1]
-            K_p.append(_spread(task.K_p, m, f"K_p of task '{task.name}'"))
-            K_v.append(_spread(task.K_v, m, f"K_v of task '{task.name}'"))
-        m = sum(len(gain) for gain in K_p[first:])
-        R = _spread(level.R, robot.n, f"R of level '{level.name}'")
+    for level, own in zip(levels, counts, strict=True):
+        start = forms[-1].rows.stop if forms else 0
+        rows = slice(start, start + sum(own))
+        R = _spread(level.R, len(settings.M_bar), f"R of level '{level.name}'")
         if settings.R_on == "acceleration":
             R = R / np.array(settings.M_bar) ** 2
-        root_Q = np.sqrt(_spread(level.Q, m, f"Q of level '{level.name}'"))
-        C = residual_model(np.concatenate(K_p[first:]), np.concatenate(K_v[first:]), N, settings.T_s).C
+        root_Q = np.sqrt(_spread(level.Q, sum(own), f"Q of level '{level.name}'"))
         K = min(level.horizon or N, N)
-        forms.append(
-            LevelForm(
-                level=level,
-                name=level.name,
-                rows=slice(start, start + m),
-                C=C,
-                root_Q=root_Q,
-                weighted_C=np.ascontiguousarray(root_Q[:, None] * C[:K, :, :K]),
-                R=R,
-                knots=K,
-                sizes=tuple(len(gain) for gain in K_p[first:]),
-            )
-        )
-        start += m
-    return StackForm(
-        levels=tuple(forms),
-        tasks=tuple(task for level in levels for task in level.tasks),
-        sizes=tuple(len(gain) for gain in K_p),
-        model=residual_model(np.concatenate(K_p), np.concatenate(K_v), N, settings.T_s),
-        root_Q=np.concatenate([form.root_Q for form in forms]),
-    )
+        forms.append(LevelForm(level, level.name, rows, model.C[:, rows], root_Q, R, K, own))
+    return StackForm(tuple(forms), tasks, sizes, model)
 
 
 class Prepared(NamedTuple):
@@ -225,29 +216,38 @@ class Prepared(NamedTuple):
         form: the levels to solve; the damping level if no other level is to be solved.
         idle: whether no level is enabled and damping is off; the torque is then held.
         off: tasks of the levels that are not solved.
+        counts: numbers of rows of all levels of the stack and of the damping level.
+        damped: whether the damping level is added.
     """
 
     form: StackForm
     idle: bool
     off: list[Task]
+    counts: Counts
+    damped: bool
 
 
-def prepare(robot: Robot, settings: Settings) -> Prepared:
-    """Prepares the levels to solve.
+def prepare(robot: Robot, settings: Settings, before: Prepared | None = None) -> Prepared:
+    """Prepares the levels to solve. before: the result for settings of the same structure, see
+    `same_structure`; then only numbers are computed.
 
     Raises:
         InputError: M̄ has the wrong length, a frame or joint is unknown, or a gain or weight does not fit.
     """
-    if len(settings.M_bar) != robot.n:
-        raise InputError(f"M_bar has {len(settings.M_bar)} entries: '{robot.name}' has {robot.n} joints")
-    levels = active_levels(settings.stack, settings.damping, freedom_left(robot, settings.stack))
+    n, every = robot.n, (*settings.stack, DAMPING_LEVEL)
+    if len(settings.M_bar) != n:
+        raise InputError(f"M_bar has {len(settings.M_bar)} entries: '{robot.name}' has {n} joints")
+    counts = _counts(robot, every) if before is None else before.counts
+    damped = before.damped if before else settings.damping and freedom_left(robot, settings.stack) > 0
+
+    def form(levels: Sequence[int]) -> StackForm:
+        return stack_form(robot, [every[k] for k in levels], settings, [counts[k] for k in levels])
+
+    solved = [k for k, level in enumerate(every if damped else settings.stack) if level.enabled]
+    off = [k for k, level in enumerate(settings.stack) if not level.enabled]
     # Disabled levels are prepared too, so that a wrong gain is refused now and not when the level is enabled.
-    stack_form(robot, (*settings.stack, DAMPING_LEVEL), settings)
-    return Prepared(
-        form=stack_form(robot, levels or (DAMPING_LEVEL,), settings),
-        idle=not levels,
-        off=[task for level in settings.stack if level not in levels for task in level.tasks],
-    )
+    tasks = list(form(off).tasks) if off else []
+    return Prepared(form(solved or [len(every) - 1]), not solved, tasks, counts, damped)
 
 
 def usable(x: Array) -> bool:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Annotated, Any, Literal
 
 from himpc.limits import Limits
+from himpc.limits.limits import Avoidance
 from himpc.qp import Solver, is_installed
-from himpc.stack import Stack, check_names
+from himpc.stack import Level, Stack, check_names
+from himpc.tasks import Task
 from robots import InputError, NominalSettings
 from robots.ranges import Range, Shown, check_fields
 
@@ -63,11 +66,43 @@ class Settings:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if not is_installed(self.solver):
+        if self.solver != "daqp" and not is_installed(self.solver):
             raise InputError(
                 f"solver '{self.solver}' needs CasADi, which is missing: pip install casadi, or use daqp"
             )
         check_names(self.stack)
+
+
+WEIGHTS: Mapping[type, tuple[str, ...]] = {Level: ("Q", "R")}
+NUMBERS: Mapping[type, tuple[str, ...]] = WEIGHTS | {
+    Settings: ("M_bar",),
+    Task: ("K_p", "K_v"),
+    Limits: ("torque_scale", "velocity_scale", "velocity_approach", "torque_rate"),
+    Avoidance: ("d_safe", "margin", "reaction", "deceleration", "pull", "velocity_margin"),
+}
+"""The numbers that a controller replaces without being built anew, by the class of their owner. All other
+settings are the structure of the stack and of the horizon."""
+
+
+def same_structure(one: Any, other: Any, numbers: Mapping[type, tuple[str, ...]] = NUMBERS) -> bool:
+    """Returns whether two settings, or parts of them, differ at most in `numbers`. A number that is zero in
+    one of them only is a difference in structure, since zero switches some of them off."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, tuple):
+        pairs = zip(one, other, strict=False)
+        return len(one) == len(other) and all(same_structure(*pair, numbers) for pair in pairs)
+    if not is_dataclass(one):
+        return one == other
+    free = {name for owner, names in numbers.items() if isinstance(one, owner) for name in names}
+    return all(
+        bool(a) == bool(b) if name in free else same_structure(a, b, numbers)
+        for name, a, b in (
+            (each.name, getattr(one, each.name), getattr(other, each.name)) for each in fields(one)
+        )
+    )
 
 
 def check_solver(settings: Settings, used: bool) -> None:

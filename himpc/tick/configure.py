@@ -13,7 +13,6 @@ from himpc.kinematics.geometry import geometry
 from himpc.limits import LimitsInForce
 from himpc.limits.constraints import bit_of, imposed
 from himpc.limits.rows import profiles
-from himpc.limits.velocity import approached, reaction
 from himpc.references import Preview, Reference
 from himpc.references.curves import curve_of
 from himpc.tasks import Damping, FrameOrientation, FramePosition, Joints, Posture, Task
@@ -21,10 +20,10 @@ from himpc.tasks.axes import AXES, FrameTask
 from himpc.tasks.joints import OnJoints
 from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena
-from himpc.tick.kernel.arrays import PULL, Array
+from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
 from himpc.tick.kernel.references import EASED, SAMPLED, UNIFORM
-from himpc.tick.tables import LevelTable, python_constraints, sizes, write_effects, write_levels
+from himpc.tick.tables import python_constraints, sizes
 from robots import Robot
 
 Span = tuple[int, Task, slice]
@@ -39,38 +38,26 @@ def is_built_in(task: Task) -> bool:
 
 
 def arena_for(
-    robot: Robot, settings: Settings, form: StackForm, off: Sequence[Task], levels: Sequence[LevelTable]
+    robot: Robot, settings: Settings, form: StackForm, off: Sequence[Task], levels: int
 ) -> tuple[Arena, list[Span]]:
-    """Returns an arena with the tables of a robot and its settings, and the rows of each task.
+    """Returns an arena for a robot and its settings, and the rows of each task; `write_numbers` fills it.
 
     Args:
         robot, settings: as for a controller.
         form: the levels that are solved.
         off: tasks that are measured only.
-        levels: the kernel's data of each level.
+        levels: number of levels.
     """
     tasks = (*form.tasks, *off)
     counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
     constraints = imposed(settings.limits)
     N, solved = settings.horizon, sum(form.sizes)
     bounds, directed = len(constraints) * N, len(python_constraints(constraints))
-    arena, spans = write_tasks(robot, tasks, counts, N, solved, len(levels), bounds, directed)
-    f = arena.f
-    model = form.model
-    f["M_bar"][:] = settings.M_bar
-    f["K_p"][:solved], f["K_v"][:solved] = model.K_p, model.K_v
-    f["on_velocity"][:, :solved], f["on_acceleration"][:, :solved] = model.on_velocity, model.on_acceleration
-    for level in form.levels:
-        write_effects(arena, level.rows, level.root_Q, level.weighted_C)
-    write_levels(arena, levels)
-    limits = settings.limits
-    f["L"][:] = profiles(N, constraints)
+    arena, spans = write_tasks(robot, tasks, counts, N, solved, levels, bounds, directed)
+    arena.f["L"][:], arena.f["nothing"][:] = profiles(N, constraints), np.nan
     arena.i["bit"][:] = np.repeat([bit_of(constraint) for constraint in constraints], N)
-    f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
-    f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
-    f["scalars"][PULL] = limits.avoidance.largest_error
-    f["nothing"][:] = np.nan
-    arena.i["sizes"][9] = {"viability": VIABILITY, "paper": PAPER, "off": OFF}[limits.position]
+    arena.f["scalars"][:2] = settings.T_s
+    arena.i["sizes"][9] = {"viability": VIABILITY, "paper": PAPER, "off": OFF}[settings.limits.position]
     return arena, spans
 
 

@@ -169,6 +169,22 @@ class Distances:
         """Whether an object with a row moves."""
         return self._pairs is not None and bool(self._pairs.f["about"][FASTEST] > MOVING)
 
+    def change(self, avoidance: Avoidance) -> None:
+        """Takes other numbers, and forgets the distances of the last tick."""
+        before, self._avoidance, self.velocity_margin = self._avoidance, avoidance, avoidance.velocity_margin
+        if self._pairs is not None:
+            self._pairs.f["about"][[ROOM, FASTEST]] = math.inf, 0.0
+            if avoidance != before:
+                self._write_numbers(self._pairs, len(self._observed.shapes))
+
+    def _write_numbers(self, pairs: _Pairs, objects: int) -> None:
+        avoidance, f = self._avoidance, pairs.f
+        kept = avoidance.d_safe + avoidance.margin
+        f["shares"][:] = 1.0
+        if kept > 0.0:
+            f["shares"][objects:] = np.minimum(1.0, _links(self._robot).kept / kept)
+        f["numbers"][:] = avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration
+
     def observe(self, observed: Observed) -> None:
         """Stores the present placements and velocities of the objects."""
         before, self._observed, B = self._observed, observed, len(observed.shapes)
@@ -182,16 +198,13 @@ class Distances:
 
     def _know(self, observed: Observed) -> _Pairs:
         """Prepares the arrays for a new set of objects."""
-        robot, avoidance = self._robot, self._avoidance
+        robot = self._robot
         around = cover_surroundings(robot, cover_of(robot), observed.shapes)
-        links, B = _links(robot), len(observed.shapes)
-        around.meets[B:] = links.meets
-        pairs, kept = _Pairs(geometry(robot), around, row_count(robot.n)), avoidance.d_safe + avoidance.margin
-        pairs.f["shares"][:] = 1.0
-        if kept > 0.0:
-            pairs.f["shares"][B:] = np.minimum(1.0, links.kept / kept)
+        objects = len(observed.shapes)
+        around.meets[objects:] = _links(robot).meets
+        pairs = _Pairs(geometry(robot), around, row_count(robot.n))
         pairs.f["fastest"][:] = self._fastest
-        pairs.f["numbers"][:] = avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration
+        self._write_numbers(pairs, objects)
         self._named = ("",) * robot.n
         self._names = [[f"{link} – {name}" for link in around.links] for name in around.names]
         return pairs

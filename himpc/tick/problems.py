@@ -12,7 +12,7 @@ from himpc.tick.fallbacks import perform, solve_level
 from himpc.tick.kernel.arena import Arena, Snapshot
 from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.control_period import FINISH, LEVELS
-from himpc.tick.tables import LevelTable, budget_of, python_constraints, sizes, write_effects, write_levels
+from himpc.tick.tables import budget_of, python_constraints, sizes, write_effects, write_levels
 
 
 def solve_problems(
@@ -37,10 +37,8 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
     for index, problem in enumerate(problems):
         span = slice(int(ends[index]), int(ends[index + 1]))
         f["B"][:, span], f["free"][:, span] = problem.B, problem.free
-        K = problem.knots
-        weighted_C = problem.root_Q[:, None] * problem.C[:K, :, :K]
-        write_effects(arena, span, problem.root_Q, weighted_C)
-        tables.append(LevelTable(span, problem.knots, problem.R, span, problem.knots, problem.R))
+        write_effects(arena, span, problem.root_Q, problem.C, problem.knots)
+        tables.append((span, problem.knots, problem.R))
         before = previous.get(problem.name)
         if before is not None:
             write_warm_start(arena, index, before.active)

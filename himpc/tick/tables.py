@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from himpc.limits import POSITION, TORQUE, VELOCITY
 from himpc.limits.constraint import Constraint
+from himpc.limits.velocity import approached, reaction
 from himpc.qp import KKT_TOLERANCE
 from himpc.tick.kernel.arena import Arena
-from himpc.tick.kernel.arrays import Array, sizes_of
+from himpc.tick.kernel.arrays import PULL, REACTION, Array, sizes_of
 
 if TYPE_CHECKING:
-    from himpc.formulation.forms import LevelForm
+    from himpc.formulation.forms import StackForm
+    from himpc.formulation.settings import Settings
 
 BUDGET = 50e6
 """Largest number of multiplications for changes of active rows in one tick. They take about ten milliseconds,
@@ -25,33 +26,6 @@ _ROUNDS = 12_000
 """Largest number of changes of active rows in one tick; a tick that reaches it takes a few milliseconds."""
 ACCURACY = 1e-8
 """N·m: largest distance of a point from the optimum, since H ≥ ρ."""
-
-
-@dataclass(frozen=True, eq=False)
-class LevelTable:
-    """The data of a level for the kernel.
-
-    Attributes:
-        rows: its rows among the rows of all levels.
-        knots: number of knots K of its residual.
-        R: (n,) weight of the increments.
-        own_rows, own_knots, own_R: rows, knots and R for the level's evidence; they differ from the others
-            only without priorities.
-        alone: whether the level is exempt from (33).
-    """
-
-    rows: slice
-    knots: int
-    R: Array
-    own_rows: slice
-    own_knots: int
-    own_R: Array
-    alone: bool = False
-
-    @classmethod
-    def of(cls, level: LevelForm) -> LevelTable:
-        """Returns the table of a level of a strict hierarchy."""
-        return cls(level.rows, level.knots, level.R, level.rows, level.knots, level.R)
 
 
 _BUILT_IN = (TORQUE, VELOCITY, POSITION)
@@ -71,36 +45,66 @@ def budget_of(arena: Arena) -> float:
     return min(BUDGET, _ROUNDS * (N * n * n + 4.0 * arena.f["lower"].size))
 
 
-def write_levels(arena: Arena, levels: Sequence[LevelTable]) -> None:
-    """Writes the table of levels."""
-    f = arena.f
-    for index, level in enumerate(levels):
-        rho = float(level.R.min())
-        metric = np.sqrt(rho / level.R)
-        f["rho"][index], f["metric"][index], f["R"][index] = rho, metric, level.own_R
+def write_levels(arena: Arena, levels: Sequence[tuple[slice, int, Array]], alone: bool = False) -> None:
+    """Writes the table of levels.
+
+    Args:
+        levels: the rows, the knots K of the residual and the weight R (n,) of each level.
+        alone: whether the levels are exempt from (33). Level p then has the cost of levels 1 … p, and the
+            evidence of its own cost.
+    """
+    f, first, K, R = arena.f, 0, 0, np.zeros(arena.f["R"].shape[1])
+    for index, (rows, own_K, own_R) in enumerate(levels):
+        first, K, R = (0, max(K, own_K), R + own_R) if alone else (rows.start, own_K, own_R)
+        rho = float(R.min())
+        metric = np.sqrt(rho / R)
+        f["rho"][index], f["metric"][index], f["R"][index] = rho, metric, own_R
         f["accuracy"][index] = min(ACCURACY * rho, KKT_TOLERANCE)
-        arena.i["level"][index] = (
-            level.rows.start,
-            level.rows.stop,
-            level.knots,
-            index > 0 and bool((f["metric"][index - 1] != metric).any()),
-            level.alone,
-            level.own_rows.start,
-            level.own_rows.stop,
-            level.own_knots,
-        )
+        afresh = index > 0 and bool((f["metric"][index - 1] != metric).any())
+        arena.i["level"][index] = first, rows.stop, K, afresh, alone, rows.start, rows.stop, own_K
 
 
-def write_effects(arena: Arena, rows: slice, root_Q: Array, weighted_C: Array) -> None:
-    """Writes √Q and the effect coefficients √Q c_l of some rows; (m,) and (K, m, K) of `LevelForm`."""
-    f, K = arena.f, len(weighted_C)
-    f["root_Q"][rows] = root_Q
+def write_effects(
+    arena: Arena, rows: slice, root_Q: Array, C: Array, K: int, share: float | Array = 1.0
+) -> None:
+    """Writes √Q and the effect coefficients √Q c_l of some rows.
+
+    Args:
+        rows, root_Q, C, K: as `rows`, `root_Q`, `C` and `knots` of `LevelForm`.
+        share: factor on √Q, one number or one per row.
+    """
+    f, by_row = arena.f, np.broadcast_to(share, root_Q.shape)
+    f["root_Q"][rows] = by_row * root_Q
+    weighted_C = by_row[:, None] * (root_Q[:, None] * C[:K, :, :K])
     f["C"][rows, :K] = weighted_C[:, :, 0].T
     # A row with fewer knots is padded with zeros. Only in the padding, its effect on the next knot is zero:
     # this shows the number of its knots.
     arena.i["row_knots"][rows] = (np.diagonal(weighted_C, axis1=0, axis2=2) > 0.0).sum(axis=1)
-    by_row = weighted_C.transpose(1, 0, 2)
-    f["S"][rows, :K, :K] = by_row.transpose(0, 2, 1) @ by_row
+    of_rows = weighted_C.transpose(1, 0, 2)
+    f["S"][rows, :K, :K] = of_rows.transpose(0, 2, 1) @ of_rows
+
+
+def write_numbers(
+    arena: Arena, settings: Settings, form: StackForm, idle: bool = False, alone: bool = False
+) -> None:
+    """Writes the numbers of settings, see `NUMBERS`, to an arena for settings of the same structure.
+
+    Args:
+        form: the levels. idle: whether no level is solved. alone: see `write_levels`.
+    """
+    f, model, limits, m = arena.f, form.model, settings.limits, sum(form.sizes)
+    f["M_bar"][:] = settings.M_bar
+    f["K_p"][:m], f["K_v"][:m] = model.K_p, model.K_v
+    f["on_velocity"][:, :m], f["on_acceleration"][:, :m] = model.on_velocity, model.on_acceleration
+    for level in form.levels:
+        write_effects(arena, level.rows, level.root_Q, level.C, level.knots)
+    solved = () if idle else form.levels
+    write_levels(arena, [(level.rows, level.knots, level.R) for level in solved], alone)
+    f["approach"][:] = approached(settings.horizon, limits.velocity_approach * settings.T_s)[:, 0]
+    f["scalars"][REACTION], f["scalars"][PULL] = (
+        reaction(limits, settings.T_s),
+        limits.avoidance.largest_error,
+    )
 
 
 def sizes(

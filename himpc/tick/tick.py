@@ -8,24 +8,24 @@ from time import perf_counter_ns
 
 import numpy as np
 
-from himpc.cascade.level import LevelProblem, LevelSolution
-from himpc.formulation.forms import StackForm
+from himpc.cascade.level import FALLBACKS, LevelProblem, LevelSolution
+from himpc.formulation.forms import Prepared
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce, Rows
 from himpc.limits.constraints import imposed
+from himpc.limits.distance import DISTANCE
 from himpc.plan import AtOnce, Evidence, Plan
 from himpc.printed import knots
 from himpc.references import Preview
 from himpc.references.outlook import observed_by
-from himpc.tasks import Task
 from himpc.telemetry import Layout
 from himpc.tick.configure import arena_for, write_limits, write_velocity_limits
 from himpc.tick.distances import Distances
 from himpc.tick.fallbacks import perform
 from himpc.tick.gather import gathered
 from himpc.tick.kernel.arena import Snapshot
-from himpc.tick.kernel.arrays import PULL, Array
+from himpc.tick.kernel.arrays import PERIOD, PULL, Array
 from himpc.tick.kernel.control_period import (
     ALL_PARTS,
     FINISH,
@@ -39,20 +39,23 @@ from himpc.tick.preview_writer import PreviewWriter
 from himpc.tick.problems import solutions, write_warm_start
 from himpc.tick.python_bounds import PythonBounds
 from himpc.tick.python_rows import PythonRows
-from himpc.tick.tables import LevelTable, budget_of, write_effects
+from himpc.tick.tables import budget_of, write_effects, write_numbers
 from robots import Robot
 
 
 class CompiledTick:
-    """The arena of one controller with one set of settings. `budget` is the largest number of multiplications
-    in a tick.
+    """The arena of one controller.
+
+    Attributes:
+        budget: the largest number of multiplications in a tick.
+        distances: the pairs whose distances are kept; None if none are.
 
     Args:
         robot: gives the geometry.
         settings: as for the controller.
-        form: the levels that are solved.
-        off: tasks of the levels that are not solved; only their errors are computed.
-        levels: the kernel's data of each level; if it is empty, no level is solved.
+        prepared: the levels that are solved, and the tasks of which only the errors are computed.
+        alone: whether the levels have no priorities, see `write_levels`. The solution of the last level is
+            then applied, and the other levels are solved for the evidence only.
         tolerance: N·m; all levels are solved again, along their own prediction, until no increment changes by
             more than this, see `NHIMPC`.
         most: largest number of these iterations.
@@ -62,26 +65,41 @@ class CompiledTick:
         self,
         robot: Robot,
         settings: Settings,
-        form: StackForm,
-        off: list[Task],
-        levels: list[LevelTable],
+        prepared: Prepared,
+        alone: bool = False,
         tolerance: float = math.inf,
         most: int = 1,
     ) -> None:
-        self._form, self._settings, self._levels = form, settings, levels
-        self.arena, self._spans = arena_for(robot, settings, form, off, levels)
+        form = prepared.form
+        levels = 0 if prepared.idle else len(form.levels)
+        self.arena, self._spans = arena_for(robot, settings, form, prepared.off, levels)
         self._python_rows = PythonRows(robot, self.arena, self._spans)
         self._ends = np.array([span.stop for _, _, span in self._spans[: len(form.tasks)]], np.intp)
         constraints, f = imposed(settings.limits), self.arena.f
         self._rows = Rows(f["L"], f["lower"], f["upper"], constraints)
-        self._python_bounds = PythonBounds(robot, self.arena, settings, constraints)
+        on = DISTANCE in constraints
+        self.distances = Distances(robot, settings.limits.avoidance) if on else None
+        self._python_bounds = PythonBounds(self.arena, constraints, self.distances)
         self._tolerance, self._most = tolerance, most
         self._limits: LimitsInForce | None = None
-        self._shares: list[float | Array] = [1.0] * len(form.levels)
-        self._started = self._looked = False
+        self._started = False
         self._writer = PreviewWriter(self.arena, self._python_rows, settings)
         self._gathered: tuple[Layout, Array | None] | None = None
         self._ticks, self.budget = 0, budget_of(self.arena)
+        self._alone = alone
+        self.change(settings, prepared)
+
+    def change(self, settings: Settings, prepared: Prepared) -> None:
+        """Writes the numbers of settings of the same structure, see `same_structure`. The memory remains,
+        except the previous velocities of tasks, which no longer belong to the levels."""
+        self._settings, self._form = settings, prepared.form
+        self._solved = () if prepared.idle else prepared.form.levels
+        write_numbers(self.arena, settings, self._form, prepared.idle, self._alone)
+        if self.distances is not None:
+            self.distances.change(settings.limits.avoidance)
+        self._shares: list[float | Array] = [1.0] * len(self._form.levels)
+        self._looked = False
+        self.arena.i["known"][0] = 0
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
         """Copies a controller's memory into the arena. Without a memory, constant velocity is assumed for the
@@ -91,15 +109,14 @@ class CompiledTick:
         f, i = self.arena.f, self.arena.i
         f["q_was"][:], f["v_was"][:], f["scalars"][0] = memory.q, memory.v, memory.period
         i["known"][:], i["warm_count"][:], f["U_was"][:] = 0, 0, 0.0
-        if memory.x_dot is not None and memory.form is self._form:
-            f["x_dot_was"][: memory.x_dot.size], i["known"][0] = memory.x_dot, 1
         if memory.predicted_q is not None and len(memory.predicted_q) == N + 1:
             f["path"][:] = memory.predicted_q  # unchanged numbers stay bitwise the same
         else:
             f["path"][1], f["path"][2 : N + 1] = q, knots(memory.predicted_q, q, v, N, T_s)[1:]
-        for index, level in enumerate(self._form.levels if self._levels else ()):
+        for index, level in enumerate(self._solved):
             before = memory.solutions.get(level.name)
             if before is not None:
+                f["fallback"][index] = FALLBACKS.index(before.fallback)
                 write_warm_start(self.arena, index, before.active)
                 if before.U.shape == f["U"][index].shape:
                     f["U_was"][index], i["known"][1] = before.U, 1
@@ -115,22 +132,14 @@ class CompiledTick:
         if not self._started:
             return None
         f, i = self.arena.f, self.arena.i
-        known = bool(i["known"][0])
         levels = self._solutions(self.arena.snapshot()) if i["known"][1] else []
         return Memory(
             f["q_was"].copy(),
             f["v_was"].copy(),
-            float(f["scalars"][0]),
-            f["x_dot_was"][: sum(self._form.sizes)].copy() if known else None,
-            self._form if known else None,
-            f["path"].copy(),
-            {level.name: level for level in levels},
+            float(f["scalars"][PERIOD]),
+            predicted_q=f["path"].copy(),
+            solutions={level.name: level for level in levels},
         )
-
-    @property
-    def distances(self) -> Distances | None:
-        """The pairs whose distances are kept; None if none are."""
-        return self._python_bounds.distances
 
     def progress(self) -> tuple[Array, float]:
         """Returns the length of the last error of each solved task, m or rad, and the largest velocity of a
@@ -145,10 +154,8 @@ class CompiledTick:
     def fade(self, index: int, share: float | Array) -> None:
         """Multiplies a level's √Q by `share`, one number or one per row."""
         if not np.array_equal(share, self._shares[index]):
-            level = self._form.levels[index]
-            self._shares[index] = share
-            by_row = np.broadcast_to(share, level.root_Q.shape)
-            write_effects(self.arena, level.rows, by_row * level.root_Q, by_row[:, None] * level.weighted_C)
+            level, self._shares[index] = self._form.levels[index], share
+            write_effects(self.arena, level.rows, level.root_Q, level.C, level.knots, share)
 
     def take_M_bar(self, M_bar: Array) -> None:
         """Sets the diagonal of M̄, (n,) kg·m²."""
@@ -195,7 +202,7 @@ class CompiledTick:
             else:
                 before = None
             self._python_rows.write(previews)
-            self._rows = self._python_bounds.write(self._rows, limits, observed_by(previews))
+            self._rows = self._python_bounds.write(self._rows, self._settings, limits, observed_by(previews))
             unsolved = perform(arena, parts, self._rows)
             if unsolved == NOT_FINITE:
                 return None
@@ -226,16 +233,13 @@ class CompiledTick:
         self._writer.write(previews)
 
     def _solutions(self, snapshot: Snapshot) -> list[LevelSolution]:
-        return solutions([level.name for level in self._form.levels], snapshot) if self._levels else []
+        return solutions([level.name for level in self._solved], snapshot) if self._solved else []
 
     def _plan(
         self, unsolved: int, tau_0: Array, limits: LimitsInForce, iterations: int, started: int
     ) -> Plan:
         ticks = self._ticks
-        # Without priorities, the solution of the last level is applied, and the other levels are solved for
-        # the evidence only.
-        alone = bool(self._levels) and self._levels[0].alone
-        idle_us = float(self.arena.f["time_us"][:-1].sum()) if alone else 0.0
+        idle_us = float(self.arena.f["time_us"][:-1].sum()) if self._alone else 0.0
 
         def evidence() -> Evidence:
             if self._ticks != ticks:
@@ -278,14 +282,14 @@ class CompiledTick:
         )
 
     def _at_once(self) -> AtOnce:
-        f, count = self.arena.f, len(self._levels)
+        f, count = self.arena.f, len(self._solved)
         J = f["B"][0] * f["M_bar"]
-        return AtOnce(f["U"][:count, 0].copy(), [J[level.own_rows] for level in self._levels[:-1]])
+        return AtOnce(f["U"][:count, 0].copy(), [J[level.rows] for level in self._solved[:-1]])
 
     def _fill(self, row: Array, layout: Layout) -> bool:
         """Writes a row of telemetry in one gather operation, see `Plan.fill`."""
         if self._gathered is None or self._gathered[0] is not layout:
-            levels = [level.name for level in self._form.levels] if self._levels else []
+            levels = [level.name for level in self._solved]
             self._gathered = layout, gathered(self.arena, layout, self._spans, levels)
         index = self._gathered[1]
         if index is None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.controllers import Controller
+from himpc.formulation.settings import WEIGHTS, same_structure
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Plan, write_plan
 from himpc.references import Outlook, Preview, Reference, Target
@@ -146,6 +147,10 @@ class TorqueSession(Session[Plan]):
 
     def adopt(self, settings: SceneSettings) -> None:
         assert isinstance(settings, TorqueSettings)
+        if same_structure(settings, self.settings, WEIGHTS):
+            self.controller.configure(settings.for_controller())
+            self.settings = settings
+            return
         check_period(self.robot, settings)
         layout, references = self.layout, self.references
         recomposed = not same_tasks(settings.levels, self.settings.levels)

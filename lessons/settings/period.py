@@ -74,7 +74,7 @@ def _too_coarse(robot: Robot, settings: TorqueSettings) -> str:
 
 def check_period(robot: Robot, settings: TorqueSettings) -> None:
     """Raises InputError if T_s is longer than `USUAL` and than `longest_period`."""
-    if settings.T_s > max(USUAL, longest_period(robot, settings)):
+    if settings.T_s > USUAL and settings.T_s > longest_period(robot, settings):
         raise InputError(warning(robot, settings))
 
 

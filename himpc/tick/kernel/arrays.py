@@ -59,7 +59,7 @@ class TickArrays(NamedTuple):
     v_was: Annotated[
         Array, "n", "rad/s", "finish_tick tick → distance_rows fallbacks linearize python_bounds python_rows"
     ]
-    x_dot_was: Annotated[Array, "M", "m/s", "finish_tick linearize tick → itself"]
+    x_dot_was: Annotated[Array, "M", "m/s", "finish_tick linearize → itself"]
     path: Annotated[Array, "N1 n", "rad", "finish_tick kinematics tick → linearize python_rows"]
     warm_multiplier: Annotated[Array, "r k", "1/N·m", "finish_tick solve_level problems → itself"]
     U_was: Annotated[Array, "r N n", "N·m", "finish_tick problems tick → fallbacks"]
@@ -68,15 +68,15 @@ class TickArrays(NamedTuple):
         Array,
         "n",
         "kg·m²",
-        "configure kinematics problems tick → distance_rows fallbacks finish_tick linearize python_bounds",
+        "kinematics problems tables tick → distance_rows fallbacks finish_tick linearize python_bounds",
     ]
-    K_p: Annotated[Array, "M", "1/s²", "configure → linearize"]
-    K_v: Annotated[Array, "M", "1/s", "configure → linearize"]
+    K_p: Annotated[Array, "M", "1/s²", "tables → linearize"]
+    K_v: Annotated[Array, "M", "1/s", "tables → linearize"]
     root_Q: Annotated[Array, "M", "s²/m", "tables → fallbacks finish_tick solve_level"]
     C: Annotated[Array, "M N", "s²/m", "tables → fallbacks finish_tick solve_level"]
     S: Annotated[Array, "M N N", "s⁴/m²", "tables → solve_level"]
-    on_velocity: Annotated[Array, "N M", "1/s", "configure → linearize"]
-    on_acceleration: Annotated[Array, "N M", "1", "configure → linearize"]
+    on_velocity: Annotated[Array, "N M", "1/s", "tables → linearize"]
+    on_acceleration: Annotated[Array, "N M", "1", "tables → linearize"]
     rho: Annotated[Array, "r", "1/(N·m)²", "tables → fallbacks solve_level"]
     metric: Annotated[Array, "r n", "1", "tables → fallbacks solve_level"]
     R: Annotated[Array, "r n", "1/(N·m)²", "tables → finish_tick"]
@@ -88,12 +88,12 @@ class TickArrays(NamedTuple):
     direction: Annotated[
         Array, "g n n", "1", "distance_rows problems python_bounds → finish_tick solve_level"
     ]
-    approach: Annotated[Array, "N", "1", "configure → distance_rows linearize"]
+    approach: Annotated[Array, "N", "1", "tables → distance_rows linearize"]
     scalars: Annotated[
         Array,
         "5",
         "s, m",
-        "configure finish_tick kinematics preview_writer problems tick → "
+        "configure finish_tick kinematics preview_writer problems tables tick → "
         "distance_rows fallbacks linearize python_bounds",
     ]
     # The robot.
@@ -134,7 +134,7 @@ class TickArrays(NamedTuple):
     at_bound: Annotated[Array, "n", "1", "finish_tick → gather"]
     priority_leak: Annotated[Array, "1", "m/s²", "finish_tick → gather"]
     active: Annotated[Array, "r", "1", "finish_tick → gather"]
-    fallback: Annotated[Array, "r", "1", "control_period fallbacks → gather finish_tick problems"]
+    fallback: Annotated[Array, "r", "1", "control_period fallbacks tick → gather finish_tick problems"]
     time_us: Annotated[Array, "r", "µs", "control_period fallbacks → gather problems tick"]
     nothing: Annotated[Array, "1", "1", "configure → gather"]
     # Scratch.
