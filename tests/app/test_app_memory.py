@@ -58,7 +58,8 @@ SLOW = pytest.mark.nightly("app/client", "app/worker", "himpc/htmpc", "lessons/s
     ids=str,
 )
 def test_ticks_keep_nothing(run_spec: RunSpec, ticks: int) -> None:
-    """At torque level, 8 bytes per tick would be half a megabyte per minute."""
+    """The blocks are Python's small objects: one per tick would be seen. Of what libraries allocate, 8 bytes
+    per tick would be seen; at torque level they would be half a megabyte per minute."""
     body = SimulationRunner(SceneChoice(run_spec))
 
     def run() -> None:
@@ -70,9 +71,10 @@ def test_ticks_keep_nothing(run_spec: RunSpec, ticks: int) -> None:
     try:
         for _ in range(2):  # after this, the memory for the last seconds is full
             run()
-        before = allocated()
+        before, blocks = allocated(), sys.getallocatedblocks()
         run()
         assert allocated() - before < 8000
+        assert sys.getallocatedblocks() - blocks < 0.7 * ticks
     finally:
         body.close()
 
