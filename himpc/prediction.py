@@ -50,12 +50,11 @@ class ResidualModel:
 
     Attributes:
         C: (N, m, N), zero above the diagonal.
-        on_error, on_velocity, on_acceleration: (N, m) weights of x̃_k, ẋ_k, ẍ_k in the free residual.
+        on_velocity, on_acceleration: (N, m) weights of ẋ_k and ẍ_k in the free residual.
         K_p, K_v: (m,).
     """
 
     C: Array
-    on_error: Array
     on_velocity: Array
     on_acceleration: Array
     K_p: Array
@@ -79,7 +78,7 @@ class ResidualModel:
             displacement_d: x_d(k+j) ⊖ x_d(k), j = 1 … N, (N, m).
             velocity_d, acceleration_d: ẋ_d and ẍ_d at k+1 … k+N, (N, m).
         """
-        moving = self.on_error * error + self.on_velocity * velocity + self.on_acceleration * acceleration
+        moving = self.K_p * error + self.on_velocity * velocity + self.on_acceleration * acceleration
         return moving - (acceleration_d + self.K_v * velocity_d + self.K_p * displacement_d)
 
 
@@ -91,7 +90,6 @@ def residual_model(K_p: Array, K_v: Array, N: int, T_s: float) -> ResidualModel:
     j = np.arange(N)[:, None].astype(float)
     return ResidualModel(
         C=np.where(lag >= 0, C, 0.0),
-        on_error=np.broadcast_to(K_p, (N, K_p.size)),
         on_velocity=K_v + K_p * T_s * (j + 1.0),
         on_acceleration=1.0 + K_v * T_s * (j + 1.0) + K_p * T_s**2 * j * (j + 1.0) / 2.0,
         K_p=K_p,

@@ -56,6 +56,7 @@ class HIMPC(TorqueController):
         self.kernel.forget()
         self._adaptation: Adaptation | None = None
         self._weight: dict[str, float] = {}
+        self._fade()
 
     def configure(self, settings: Settings) -> None:
         """Applies new settings immediately. If they do not fit the robot, it raises InputError and changes
@@ -123,8 +124,7 @@ class HIMPC(TorqueController):
             self._adapt(q, self._load)
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, self._settings.T_s)
         if self._weight:
-            for index, level in enumerate(self._form.levels):
-                self.kernel.fade(index, self._faded(level))
+            self._fade()
         plan = self.kernel.step(q, v, previews, self._tau_0, self._slowed(v), started)
         if plan is None:
             return self._hold(q, started)
@@ -147,6 +147,10 @@ class HIMPC(TorqueController):
         self._adaptation = adapted(before, load, q, self._tau_0, self._settings.T_s, self._M_bar_set)
         self._M_bar = self._adaptation.M_bar
         self.kernel.take_M_bar(self._M_bar)
+
+    def _fade(self) -> None:
+        for index, level in enumerate(self._form.levels):
+            self.kernel.fade(index, self._faded(level))
 
     def _faded(self, level: LevelForm) -> float | Array:
         """Returns the square root of the share of Q that is in effect for a level: one number, or one per row

@@ -20,7 +20,7 @@ from himpc.kinematics.configuration import Configuration
 from himpc.limits import TORQUE, LimitsInForce, Rows, in_force, ramp
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
-from himpc.tasks import Damping, OrientationTask
+from himpc.tasks import OrientationTask
 from himpc.tick.configure import is_built_in
 from himpc.tick.kinematics import Kinematics
 
@@ -189,15 +189,9 @@ class OneStepController(TorqueController):
             if self._off:
                 measure(self._off, here, previews, values, errors)
         previews = form.references_in_task_coordinates(here, previews)
-        wanted = np.zeros((2, error.size))
-        start = 0
-        for task, rows in zip(form.tasks, form.sizes, strict=True):
-            if not isinstance(task, Damping):
-                preview = previews[task.name]
-                wanted[:, start : start + rows] = preview.velocity[0], preview.acceleration[0]
-            start += rows
+        _, velocity_d, acceleration_d = form.motion(previews, 0)[:, 0]
         model = form.model
-        acceleration = wanted[1] - model.K_v * (J @ v - wanted[0]) - model.K_p * error - drift
+        acceleration = acceleration_d - model.K_v * (J @ v - velocity_d) - model.K_p * error - drift
         if not math.isfinite(float(acceleration.sum())):
             raise np.linalg.LinAlgError("the demand is not finite")
         return [Demand(level, J[level.rows], acceleration[level.rows]) for level in form.levels]

@@ -18,9 +18,7 @@ from himpc.limits.constraints import imposed
 from himpc.limits.velocity import reaction
 from himpc.prediction import JointState
 from himpc.references import Preview
-from himpc.references.curves import still
 from himpc.references.outlook import observed_by
-from himpc.tasks import Damping
 from himpc.tick.distances import Distances
 from robots import NominalModel, Robot
 
@@ -99,16 +97,15 @@ class Viewer:
         error = measure(form.tasks, here, previews, values, errors)
         if self._off:
             measure(self._off, here, previews, values, errors)
-        memory = self.memory or Memory.start(q, v, T_s)
+        memory = self.memory or Memory(q, v, T_s)
         x_dot, before = J @ v, memory.x_dot
         if before is None or memory.form is not form:
             past = Configuration(robot, self._elsewhere, memory.q, memory.v, previews=previews)
             before = form.jacobian(past)[0] @ memory.v
         x_ddot = (x_dot - before) / memory.period
         drift = form.drift(robot, self._elsewhere, q, v, previews, h)
-        displacement, velocity, acceleration = wanted(
-            form, form.references_in_task_coordinates(here, previews), N
-        )
+        ahead = form.references_in_task_coordinates(here, previews)
+        displacement, velocity, acceleration = form.motion(ahead, N)
         levels = [
             LevelView(
                 name=level.name,
@@ -205,14 +202,3 @@ class Viewer:
                 D = np.eye(self._robot.n) if block.directions is None else block.directions.D
                 further.append(Further(constraint.profile(self.now.N), D, block.lower, block.upper))
         return tuple(further)
-
-
-def wanted(form: StackForm, previews: Mapping[str, Preview], N: int) -> tuple[Array, Array, Array]:
-    """Returns x_d(k+j) − x_d(k), ẋ_d and ẍ_d of all rows at k … k+N, (N+1, m) each."""
-    motion: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
-    for task, rows in zip(form.tasks, form.sizes, strict=True):
-        preview = still(N, rows) if isinstance(task, Damping) else previews[task.name]
-        for column, samples in zip(motion, preview[1:], strict=True):
-            column.append(samples[: N + 1])
-    displacement, velocity, acceleration = (np.concatenate(column, axis=1) for column in motion)
-    return displacement, velocity, acceleration

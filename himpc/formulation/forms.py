@@ -129,20 +129,14 @@ class StackForm:
             [min(1.0, a / b) * part for part, a, b in zip(parts, most, lengths, strict=True)]
         )
 
-    def free(
-        self, error: Array, velocity: Array, acceleration: Array, previews: Mapping[str, Preview], N: int
-    ) -> Array:
-        """Returns e at knots 1 … N for Δτ = 0, (N, m), all rows."""
-        desired = np.empty((3, N, error.size))
-        start = 0
-        for task, rows in zip(self.tasks, self.sizes, strict=True):
-            end = start + rows
-            preview = still(N, rows) if isinstance(task, Damping) else previews[task.name]
-            desired[0, :, start:end] = preview.displacement[1:]
-            desired[1, :, start:end] = preview.velocity[1:]
-            desired[2, :, start:end] = preview.acceleration[1:]
-            start = end
-        return self.model.free(error, velocity, acceleration, *desired)
+    def motion(self, previews: Mapping[str, Preview], N: int) -> Array:
+        """Returns x_d(k+j) − x_d(k), ẋ_d and ẍ_d of all rows at k … k+N, (3, N+1, m)."""
+        parts = [
+            still(N, rows) if isinstance(task, Damping) else previews[task.name]
+            for task, rows in zip(self.tasks, self.sizes, strict=True)
+        ]
+        columns = zip(*(part[1:] for part in parts), strict=True)
+        return np.array([np.hstack([samples[: N + 1] for samples in column]) for column in columns])
 
 
 def measure(

@@ -12,7 +12,8 @@ from robots.arrays import Array
 
 
 class Memory(NamedTuple):
-    """The time-delayed signals of (9) and the previous plan.
+    """The time-delayed signals of (9) and the previous plan. `Memory(q, v, T_s)` is that of a robot that has
+    moved with constant velocity so far; q̈ and ẍ are then zero.
 
     Attributes:
         q, v: measured state of the last tick, (n,).
@@ -30,9 +31,3 @@ class Memory(NamedTuple):
     form: StackForm | None = None
     predicted_q: Array | None = None
     solutions: Mapping[str, LevelSolution] = MappingProxyType({})
-
-    @classmethod
-    def start(cls, q: Array, v: Array, T_s: float) -> Memory:
-        """Returns the memory of a robot that has moved with constant velocity so far. q̈ and ẍ are then
-        zero."""
-        return cls(q, v, T_s)

@@ -105,7 +105,7 @@ class CompiledTick:
         """Copies a controller's memory into the arena. Without a memory, constant velocity is assumed for the
         past."""
         N, T_s = self._settings.horizon, self._settings.T_s
-        memory = memory or Memory.start(q, v, T_s)
+        memory = memory or Memory(q, v, T_s)
         f, i = self.arena.f, self.arena.i
         f["q_was"][:], f["v_was"][:], f["scalars"][0] = memory.q, memory.v, memory.period
         i["known"][:], i["warm_count"][:], f["U_was"][:] = 0, 0, 0.0

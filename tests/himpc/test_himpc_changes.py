@@ -161,3 +161,18 @@ def test_a_refused_number_changes_nothing(iiwa: Robot) -> None:
             one.configure(change(settings))
     assert one.settings == settings
     np.testing.assert_array_equal(torques(one, 20, 40), torques(other, 20, 40))
+
+
+@pytest.mark.parametrize("name", ["himpc", "weighted"])
+def test_a_reset_ends_a_fade(iiwa: Robot, name: str) -> None:
+    """A controller that is reset while a level fades in has the torques of a new controller."""
+    settings = tight(iiwa)
+    one, other = (
+        make_controller(name, iiwa, of_level(enabled=False)(settings)),
+        make_controller(name, iiwa, settings),
+    )
+    torques(one, 0, 20)
+    one.configure(settings)
+    torques(one, 20, 20)
+    one.reset(np.zeros(iiwa.n))
+    np.testing.assert_array_equal(torques(one, 0, 40), torques(other, 0, 40))

@@ -98,7 +98,7 @@ def _residual(
     J = form.jacobian(at)[0]
     error = measure(form.tasks, at, previews, {}, {})
     x_dot = J @ at.v
-    free = form.free(error, x_dot, (x_dot - before) / T_s, previews, 1)[0]
+    free = form.model.free(error, x_dot, (x_dot - before) / T_s, *form.motion(previews, 1)[:, 1:])[0]
     return J, error, free, x_dot
 
 
