@@ -13,7 +13,7 @@ from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.controllers.adaptation import Adaptation, LoadModel, adapted
 from himpc.controllers.base import TorqueController
 from himpc.controllers.printed_tick import PrintedTick
-from himpc.controllers.stall_guard import guard_of
+from himpc.controllers.stall_guard import Guard, guard_of
 from himpc.formulation.forms import LevelForm, Prepared, prepare, usable
 from himpc.formulation.settings import Settings, check_solver, same_structure
 from himpc.limits import LimitsInForce, build_rows, in_force, ramp
@@ -40,6 +40,7 @@ class HIMPC(TorqueController):
     """
 
     _prepared: Prepared | None = None
+    _guard: Guard | None = None
     solves = False
     """Whether a general QP solver is used, the one in `Settings.solver`."""
 
@@ -84,7 +85,7 @@ class HIMPC(TorqueController):
         prepared = prepare(self.robot, settings, before)
         same = before is not None and settings.limits == self._settings.limits
         goal = self._goal if same else in_force(self.robot, settings.limits)
-        guard = guard_of(settings, len(prepared.form.tasks), self.robot)
+        guard = guard_of(settings, len(prepared.form.tasks), self.robot, self._guard)
         load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
         kernel = self._compile(settings, prepared) if before is None else self.kernel
         # Everything that may raise is above.

@@ -41,6 +41,11 @@ class StallGuard:
         self._joints: Array | None = None
         self._limits: tuple[LimitsInForce, Array, Array] | None = None
 
+    def recall(self, before: StallGuard) -> None:
+        """Takes over what the guard of the settings before knew of the joints. Whether the tasks make
+        progress is observed anew, as with other settings they may."""
+        self._joints, self.fastest = before._joints, before.fastest
+
     def limits(
         self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances | Anywhere | None
     ) -> LimitsInForce:
@@ -102,6 +107,12 @@ class WindupGuard:
     def fastest(self, fastest: float) -> None:
         self._stall.fastest = fastest
 
+    def recall(self, before: WindupGuard) -> None:
+        """Takes over what the guard of the settings before knew of the joints, and how far they are wound
+        up."""
+        self._stall.recall(before._stall)
+        self._tau, self._wound, self._windup = before._tau, before._wound, before._windup
+
     def limits(self, limits: LimitsInForce, tau: Array, v: Array, _: object) -> LimitsInForce:
         """Returns the limits in force at this tick, see `StallGuard.limits`."""
         if self._tau is None:
@@ -115,19 +126,27 @@ class WindupGuard:
         return slowed
 
 
-def guard_of(settings: Settings, tasks: int, robot: Robot) -> StallGuard | WindupGuard | None:
+Guard = StallGuard | WindupGuard
+
+
+def guard_of(settings: Settings, tasks: int, robot: Robot, before: Guard | None = None) -> Guard | None:
     """Returns the guard for a controller; None if the settings have no guard.
 
     Args:
         settings: the settings of the controller.
         tasks: the number of its tasks.
         robot: the robot that it controls.
+        before: the guard of the settings before, if they change while the robot moves.
     """
     limits, T_s = settings.limits, settings.T_s
     avoidance = limits.avoidance
     if not avoidance.on and not limits.stall_guard:
         return None
-    stall = StallGuard(tasks, T_s, avoidance.pull or math.inf)
-    if avoidance.on:
-        return stall
-    return WindupGuard(stall, robot, np.array(settings.M_bar), avoidance.velocity_margin, T_s)
+    guard = StallGuard(tasks, T_s, avoidance.pull or math.inf)
+    if not avoidance.on:
+        guard = WindupGuard(guard, robot, np.array(settings.M_bar), avoidance.velocity_margin, T_s)
+    if isinstance(guard, StallGuard) and isinstance(before, StallGuard):
+        guard.recall(before)
+    if isinstance(guard, WindupGuard) and isinstance(before, WindupGuard):
+        guard.recall(before)
+    return guard

@@ -5,9 +5,14 @@ from __future__ import annotations
 
 from itertools import product
 
+import numpy as np
 import pytest
 
 from benchmarks.avoidance import FAST, FAST_OFF, HARD_N, ROBOTS, run
+from lessons.events import MoveTarget, Set
+from lessons.scenes.run_spec import RunSpec
+from lessons.session.start import begin
+from lessons.session.torque import TorqueSession
 
 SEED = 2
 OFF = ["avoidance.on=false"]
@@ -58,3 +63,27 @@ def test_without_rows_baxter_does_not_fall_into_itself() -> None:
     assert total.force <= HARD_N, total.where
     assert total.speed <= FAST_OFF
     assert total.resting == total.chains
+
+
+@pytest.mark.parametrize(
+    ("path", "values"), [("levels.1.Q", (200.0, 201.0)), ("M_bar_scale", (1.0, 1.01)), ("horizon", (5, 6))]
+)
+def test_a_slider_that_moves_meanwhile_does_not_wind_the_torque_up(
+    path: str, values: tuple[float, float]
+) -> None:
+    """The guard of a blocked robot keeps what it knows of the joints when settings change thirty times a
+    second. Begun anew at each change, it let the arm jump at 6.7 times its limits off the table."""
+    session = begin(RunSpec("iiwa14-table", set=tuple(OFF)).prepared(), 0)
+    assert isinstance(session, TorqueSession)
+    target = session.target("position")
+    assert target is not None
+    above = np.array(target.raw, float)
+    below, fastest, v = above - (0.0, 0.0, above[2] + 0.15), 0.0, session.layout.fields["v"]
+    for tick in range(6000):
+        if tick % 80 == 0:
+            session.post(MoveTarget("position", tuple(below if 300 < tick < 3500 else above)))
+        if tick % 33 == 0:
+            session.post(Set(path, values[(tick // 33) % 2]))
+        session.drain()
+        fastest = max(fastest, float(np.abs(session.tick()[v] / session.robot.v_limit).max()))
+    assert fastest <= FAST_OFF

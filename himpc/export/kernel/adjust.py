@@ -7,7 +7,7 @@ import math
 from himpc.compilation.compiled import inline_kernel
 from himpc.controllers.himpc import ENABLE_SECONDS, FAINTEST
 from himpc.export.kernel.follow import MISFIT, NO_HIERARCHY, NOT_USABLE, drag
-from himpc.export.kernel.guard import unguarded
+from himpc.export.kernel.guard import observe_anew
 from himpc.export.kernel.loop_arrays import BUDGET as ALLOWED
 from himpc.export.kernel.loop_arrays import DAMPS, FADING, LEVELS, ON_ACCELERATION, SIMPLE, LoopArrays
 from himpc.limits.limits import POSITION_MARGIN
@@ -48,7 +48,7 @@ def adjust(
         return move_object(d, index, values, count)
     fault = change(t, p, what, index, values, count)
     if fault == 0 and what != TARGET and what != BUDGET:
-        unguarded(p)
+        observe_anew(p)
     return fault
 
 

@@ -37,6 +37,13 @@ def unguarded(p: LoopArrays) -> None:
 
 
 @inline_kernel
+def observe_anew(p: LoopArrays) -> None:
+    """Lets the guard observe the progress of the tasks anew, since their settings have changed. It keeps what
+    it knows of the joints."""
+    p.due[:], p.stall[0], p.stall[1], p.state[ERRORS] = math.inf, 1.0, math.inf, 0.0
+
+
+@inline_kernel
 def guard(t: TickArrays, p: LoopArrays, d: PairArrays) -> None:
     """Lowers the velocity limits in force, and sets the largest error on which tasks act."""
     n, kind, T_s = t.q.size, p.setup[GUARD], t.scalars[T_S]
