@@ -26,8 +26,8 @@ NONSENSE = {
 def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     """Makes every QP solver return an invalid point with the status of a solution."""
 
-    def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
-        return NONSENSE[kind](f, A)
+    def nonsense(problem: Any, _: object) -> tuple[Array, Array, str]:
+        return NONSENSE[kind](problem.f, problem.A)
 
     monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(get_args(qp.Solver), (nonsense,)))
 

@@ -7,6 +7,7 @@ from functools import cache
 from html import escape
 from typing import Any
 
+from app.html.text import readable
 from docs.figures.pack import Pack
 from docs.figures.scene import refuse, scene_data
 from lessons.course import load_lesson
@@ -193,7 +194,7 @@ def _claim(claim: Claim, with_ghost: bool) -> dict[str, Any]:
         "measure": _measure(claim.measure),
         "relation": claim.relation,
         "bound": claim.bound,
-        "condition": claim.condition,
+        "condition": readable(claim.condition),
         "live": judged(claim.measure, with_ghost),
     }
 
@@ -206,7 +207,7 @@ def _measure(measure: Measure) -> dict[str, Any]:
         "after": measure.after,
         "until": until,
         "over_ghost": measure.over_ghost,
-        "unit": measure.unit,
+        "unit": measure.unit.replace("deg", "°"),
     }
 
 

@@ -119,24 +119,21 @@ export class Figure {
   }
 
   private judge({ claims, prediction }: Verdict): void {
-    const shown = (words: string): string => words.replace(/ deg\b/, "°").trim();
-    const number = (value: number, unit: string): string => (isFinite(value) ? shown(`${Number(value.toPrecision(3))} ${unit}`) : "–");
+    const number = (value: number, unit: string): string => (isFinite(value) ? `${Number(value.toPrecision(3))}${unit[0] === "°" ? "" : " "}${unit}`.trim() : "–");
     this.claims.forEach((line, k) => {
       const claim = this.step!.claims[k];
       if (!claim.live) return;
       const good = holds(claim, claims[k]), measured = number(claims[k], claim.measure.unit);
       line.dataset.holds = String(good);
-      line.title = `must be ${shown(claim.condition)}`;
-      line.textContent = `${good ? "✓" : "✗"} ${claim.text} ${good ? measured : `false ${measured}, ${line.title}`}`;
+      line.textContent = `${good ? "✓" : "✗"} ${claim.text} ${good ? measured : `false ${measured}, must be ${claim.condition}`}`;
     });
     const asked = this.step!.prediction, { guess } = this;
     if (asked) {
       const was = number(prediction, asked.measure.unit), { options } = asked;
       const right = options?.findIndex(({ low, high }) => limit(low, -1) <= prediction && prediction < limit(high)) ?? -1;
-      const yours = options && guess !== null && guess !== right ? `${options[guess].text} (✗ your answer) · ` : "";
-      this.root.querySelector(".hl-answer")!.textContent = options
-        ? right < 0 ? "The run gave no measured value." : `${yours}${options[right].text} (✓ measured: ${was})`
-        : `${guess === null ? "" : `your guess ${number(guess, asked.measure.unit)} · `}measured ${was}`;
+      const yours = guess === null || guess === right ? "" : options ? `${options[guess].text} (✗ your answer) · ` : `your guess ${number(guess, asked.measure.unit)} · `;
+      this.root.querySelector(".hl-answer")!.textContent = !options ? `${yours}measured ${was}`
+        : right < 0 ? "The run gave no measured value." : `${yours}${options[right].text} (✓ measured: ${was})`;
     }
     this.say("The step is over and its claims are judged. Press Run to continue: drag the target, or change the settings.");
   }
