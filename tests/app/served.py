@@ -71,6 +71,12 @@ def get(address: str, **headers: str) -> Page:
         return Page(answer.status, answer.headers, answer.read().decode())
 
 
+def vacated(server: PageServer) -> PageServer:
+    """Returns the server after the pages of the previous test have gone."""
+    assert wait_until(lambda: not server.sessions.learners, LONG)
+    return server
+
+
 def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

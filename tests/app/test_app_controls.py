@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import viser
-from served import LONG, served, visited
+from served import LONG, served, vacated, visited
 from viser import _messages
 
 from app.client.simulation_client import SimulationClient
@@ -35,9 +35,7 @@ def running() -> Iterator[PageServer]:
 
 @pytest.fixture
 def server(running: PageServer) -> PageServer:
-    """Returns the server after the page of the previous test has gone."""
-    assert eventually(lambda: not running.sessions.learners, LONG)
-    return running
+    return vacated(running)
 
 
 def learner_of(server: PageServer) -> SimulationClient:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from served import LONG, served
+from served import LONG, served, vacated
 from viser import ClientHandle
 
 from app.adapter import private
@@ -33,9 +33,7 @@ def circling() -> Iterator[PageServer]:
 
 @pytest.fixture
 def alone(circling: PageServer) -> PageServer:
-    """Returns the server after the client of the previous test has disconnected."""
-    assert wait_until(lambda: not circling.sessions.learners, LONG)
-    return circling
+    return vacated(circling)
 
 
 def test_only_charts_in_view_are_sent(alone: PageServer) -> None:
