@@ -51,8 +51,8 @@ def guard(t: TickArrays, p: LoopArrays, d: PairArrays) -> None:
     if kind == UNGUARDED:
         return
     if p.state[GUARDED] == 0.0:
-        p.due[:], p.load[:], p.wound[:] = math.inf, 0.0, 0.0
-        p.stall[0], p.stall[1], p.windup[0], p.windup[1] = 1.0, math.inf, 0.0, 1.0
+        observe_anew(p)
+        p.load[:], p.wound[:], p.windup[0], p.windup[1] = 0.0, 0.0, 0.0, 1.0
         copy(t.v, p.mean, n)
         copy(t.tau_0, p.tau_before, n)
         p.state[GUARDED] = 1.0
