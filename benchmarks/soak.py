@@ -9,8 +9,8 @@ The program runs a server and, in a process of their own, K clients that use the
 lines of JSON. The exit code is 1 if there are faults.
 
 First form: in the first ten minutes (or the first half of a shorter run) the robots run at 2 · X times real
-time and fill the histories for playback and export. This phase lasts until every robot has run for two
-minutes of simulated time. After the M minutes one client reloads its page N times. The memory of the server
+time and fill the histories for playback and export. This phase lasts until every robot has run for 140 s
+of simulated time. After the M minutes one client reloads its page N times. The memory of the server
 and of its children may then have grown by at most 5 % since the histories were full, the numbers of threads
 and handles must be the same as before, and 100 reloads may cost at most 5 MB. The measured memory is the
 memory that a process has written and does not share with other processes. Free memory is returned to the
@@ -44,7 +44,7 @@ from statistics import median
 
 import psutil
 
-from app.client.recording import MOST, RATE
+from app.client.recording import KEPT, MOST, RATE
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load, Speed
@@ -124,7 +124,7 @@ def lasting(
     fill = min(FILL, options.minutes / 2)
     go(learners, 2.0 * options.speed)
     watched(fill, viewers.pid)
-    while not all(simulated(each) > MOST / RATE for each in learners):
+    while not all(simulated(each) > KEPT + MOST / RATE for each in learners):
         time.sleep(EVERY)
     go(learners, 1.0)
     later = watched(options.minutes - fill, viewers.pid, fill)

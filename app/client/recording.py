@@ -23,9 +23,9 @@ RATE = 100.0
 """Number of rows that are stored per simulated second."""
 FRAMES = 30.0
 """Number of frames that are stored per simulated second."""
-MOST = 12_000
-"""Largest number of rows that are stored of a whole run. Of a longer run, every second, fourth, … row is
-stored."""
+MOST = 8_000
+"""Largest number of rows that are stored of the time before the last minute. Of a longer run, every second,
+fourth, … row is stored."""
 WINDOW = 8.0
 """Simulated time, s, in the plots."""
 BUCKETS = 160
@@ -177,13 +177,13 @@ class Recording:
     def _store(self, row: np.ndarray) -> None:
         """Stores a row in the ring; the row that it replaces there becomes one of the older rows."""
         slot, old = self._stored % _MINUTE, self._stored - _MINUTE
+        if old == MOST * self._every:
+            self._older[: MOST // 2] = self._older[::2].copy()
+            self._every *= 2
         if old >= 0 and old % self._every == 0:
             self._older[old // self._every] = self._rows[slot]
         self._rows[slot] = row
         self._stored += 1
-        if self._stored == MOST * self._every:
-            self._older[: MOST // 2] = self._older[::2].copy()
-            self._every *= 2
 
     def _hold(self, until: int) -> None:
         """Fills the buckets between the newest bucket and the bucket `until` with the newest row."""
@@ -258,7 +258,7 @@ class Recording:
         return rows[rows[:, self._t] > self.latest[self._t] - KEPT]
 
     def whole(self) -> np.ndarray:
-        """Returns the rows since the last reset, evenly spaced, as densely as MOST allows, (k, size)."""
+        """Returns the rows since the last reset, evenly spaced, as densely as the older ones, (k, size)."""
         due = -self._in_ring.start % self._every
         return np.vstack([self._older[: self._older_count], self._ring()[due :: self._every]])
 
