@@ -161,10 +161,11 @@ def _shown(error: SyntaxError) -> str:
         return ""
     indent = len(line) - len(line.lstrip())
     column = max(error.offset - 1 - indent, 0)
-    return f"\n  {line.strip()[:_LONGEST_LINE]}\n  {' ' * column}^" if column < _LONGEST_LINE else ""
+    begin = max(column - _SHOWN // 2, 0)  # of a long line, the part around the place
+    return f"\n  {line.strip()[begin:][:_SHOWN]}\n  {' ' * (column - begin)}^"
 
 
-_LONGEST_LINE = 100
+_SHOWN = 100
 
 
 def sentence(path: str, error: BaseException) -> str:

@@ -102,6 +102,10 @@ FAULTS = {
         "def torque(now)\n    return 1\n",
         r"mine.py, line 1: expected ':'\n  def torque\(now\)\n {17}\^",
     ),
+    "far to the right": (
+        "a = " + 40 * "wide + " + "(\n",
+        r"mine.py, line 1: .* closed\n  .*wide \+ \(\n {52}\^",
+    ),
     "indentation": ("def torque(now):\nreturn 1\n", r"mine.py, line 2"),
     "missing name at import": ("x = nothing\n", r"mine.py, line 1: NameError"),
     "missing module": ("import no_such_module\n", r"mine.py, line 1: ModuleNotFoundError"),
