@@ -30,6 +30,7 @@ from app.panels.run.scene import RobotPanel
 from app.panels.widgets.command import add_command
 from app.tab.context import PageContext, SessionSnapshot
 from app.view.robot import GhostView, RobotView
+from app.view.surroundings import Ground
 from app.view.targets import in_order
 from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
@@ -159,19 +160,10 @@ class SceneView:
         self.covered = above, below
 
     def _build_scene(self, scene: viser.SceneApi) -> None:
-        # Shadows triple the rendering time of a frame, which matters on a laptop or a phone.
         scene.configure_default_lights(cast_shadow=False)
-        self._floor = _floor(scene, self.page.ready.room)
-        self._paint_floor()
+        self._ground = Ground(scene, self.page.robot, self.page.ready.room)
         self._robot = RobotView(scene, self.page.robot)
         self._level.add_scene(self._robot)
-
-    def _paint_floor(self) -> None:
-        """Sets the colours of the floor's grid lines, which are less conspicuous than the robot on every
-        background."""
-        cell, section = (70, 105) if self._comfort.dark else (215, 175)
-        self._floor.cell_color = (cell, cell, cell)
-        self._floor.section_color = (section, section, section)
 
     def recompose(self, ready: Ready) -> None:
         """Rebuilds the controls and plots of levels and tasks when the run continues with another stack."""
@@ -210,7 +202,8 @@ class SceneView:
     def _draw(self, moment: Moment, plots: bool) -> None:
         learner = self._learner
         with self._client.atomic():
-            self._paint_floor()
+            self._ground.paint(self._comfort.dark)
+            self._ground.move(moment.poses)
             self._robot.move(moment.poses[:-1])
             self._show_ghost(moment)
             if learner.failure is not None:
@@ -278,15 +271,6 @@ class SceneView:
         self._playback.close()
         self._time_line.close()
         self._level.close()
-
-
-def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
-    """Draws a floor below the robot and the points (k, 3), m, that the robot will reach."""
-    far = float(np.abs(room[:, :2]).max(initial=0.0))
-    if far == 0.0:
-        return scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
-    side = 2.0 * math.ceil(far + 1.0)
-    return scene.add_grid("/floor", width=side, height=side, cell_size=0.5, section_size=1.0)
 
 
 def view_of(page: PageContext) -> TorqueView | VelocityView:

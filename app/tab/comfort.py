@@ -131,6 +131,8 @@ STYLE = """
   --mantine-color-blue-filled: #1a66b8; --mantine-color-blue-filled-hover: #1d70ca;
   --mantine-color-blue-outline: #6db3f5; --mantine-primary-color-filled: #1a66b8;
 }
+canvas[data-engine] { background: linear-gradient(
+  light-dark(#dfe7f0, #15171a), light-dark(#f4f7fa, #24272c) 45%, light-dark(#fff, #2a2d33)) }
 """
 
 # A slider and the number box beside it share one label, but viser names at most one of the two. Controls

@@ -19,6 +19,7 @@ from app.client.recording import PlotWindow
 from app.html.palette import GHOST, RGB
 from app.link.poses import LinkPoses
 from app.view.camera import covered_shares, look, turn
+from app.view.surroundings import Ground
 from app.view.trails import NOTHING, trace
 from robots import Robot, load_robot
 from robots.covering.cover_of import cover_of
@@ -254,6 +255,7 @@ class RecordedRun:
         robot = load_robot(told["robot"])
         self._q, self._period, self._began = np.array(told["q"]), float(told["period"]), now
         self._poses, self._view = LinkPoses(robot), RobotView(client.scene, robot, "/recorded")
+        self._ground = Ground(client.scene, robot, np.empty((0, 3)))
         self._label = client.scene.add_label("/recorded/label", "a recorded run", anchor="bottom-center")
         aim(client.camera, robot, phone, np.empty((0, 3)))
         self.follow(now)
@@ -265,6 +267,7 @@ class RecordedRun:
         poses = self._poses.at(self._q[min(int(t / self._period), last)])
         assert poses is not None
         self._view.move(poses[:-1])
+        self._ground.move(poses)
         self._label.position = poses[-1, :3] + (0.0, 0.0, 0.08)
 
 

@@ -1,16 +1,18 @@
-"""What stands around a robot: people with balls, the reach of its arm, the objects that it can touch, and the
-contact forces."""
+"""What stands around a robot: the floor with the robot's shadow, people with balls, the reach of its arm, the
+objects that it can touch, and the contact forces."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import viser
 
-from app.html.palette import BAD, BOUND, JOINTS, RGB
+from app.html.palette import AXES, BAD, BOUND, JOINTS, RGB
 from app.link.messages import ContactPoint, Person
 from app.view.trails import NOTHING, segments
+from robots import Robot
 from robots.collision import WorldShape
 from robots.world import Ball, Box, Floor, Post, Thing, World
 
@@ -18,6 +20,86 @@ _BALL: RGB = (245, 190, 30)
 _BALL_RADIUS = 0.06  # m
 _POINTS = 96
 _TALL, _WIDE, _HEAD = 1.25, 0.17, 0.12  # m, of a person
+
+
+class Ground:
+    """The floor with the axes x and y of the world, and on it a shadow: discs below points along the arm. The
+    higher a point is, the larger and fainter is its disc. Shadows by lights would triple the time in which a
+    browser draws."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, room: np.ndarray) -> None:
+        """room: the points (k, 3), m, that the robot will reach."""
+        far = float(np.abs(room[:, :2]).max(initial=0.0))
+        cell, section = (0.1, 0.5) if far == 0.0 else (0.5, 1.0)
+        fade = 4.0 if far == 0.0 else 3.0 * math.ceil(far + 1.0)
+        self._grid = scene.add_grid(
+            "/floor",
+            infinite_grid=True,
+            cell_size=cell,
+            section_size=section,
+            fade_distance=fade,
+            fade_from="origin",
+        )
+        for name, along, colour in zip("xy", section * np.eye(3), AXES, strict=False):
+            line = np.array([[0.0 * along, along]], np.float32)
+            scene.add_line_segments(f"/axes/{name}", line, colour, thickness=0.008 * section)
+            scene.add_label(f"/axes/{name}_name", name, position=1.05 * along, anchor="center-center")
+        parents = [(parent, joint) for joint, parent in enumerate(robot.model.parents) if parent]
+        tip = robot.model.frames[robot.frame_id(robot.tip)].parentJoint
+        # `move` gets the poses of the joints 1, 2, …, and of the tip.
+        ends = np.array([*parents, (tip, robot.model.njoints)]) - 1
+        share = np.linspace(0.0, 1.0, _DISCS, endpoint=False)[None, :, None]
+        self._ends, self._share = ends, share
+        count = len(ends) * _DISCS * len(_RINGS)
+        turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+        rim = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+        faces = [(0, 1 + k, 1 + (k + 1) % len(turn)) for k in range(len(turn))]
+        self._discs = scene.add_batched_meshes_simple(
+            "/shadow",
+            np.vstack([np.zeros(3), rim]).astype(np.float32),
+            np.array(faces, np.uint32),
+            np.tile((1.0, 0.0, 0.0, 0.0), (count, 1)).astype(np.float32),
+            np.zeros((count, 3), np.float32),
+            batched_scales=np.ones(count, np.float32),
+            batched_colors=(0, 0, 0),
+            batched_opacities=np.zeros(count, np.float32),
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._shown = np.full((1, 3), np.nan)
+
+    def paint(self, dark: bool) -> None:
+        """Sets the colours of the grid lines, which are less conspicuous than the robot on every
+        background."""
+        cell, section = (70, 105) if dark else (215, 175)
+        self._grid.cell_color = (cell, cell, cell)
+        self._grid.section_color = (section, section, section)
+
+    def move(self, poses: np.ndarray) -> None:
+        """poses: (J, 7), position, m, and quaternion of all joints and of the tip."""
+        at = poses[:, :3]
+        if (np.abs(at - self._shown) <= _SHADOW_STILL).all():
+            return
+        self._shown = at.copy()
+        start, end = at[self._ends[:, :1]], at[self._ends[:, 1:]]
+        points = (start + self._share * (end - start)).reshape(-1, 3)
+        height = np.maximum(points[:, 2], 0.0)
+        size = np.outer(_RINGS, _DISC + _WIDER * height)
+        points = np.tile(points * (1.0, 1.0, 0.0), (len(_RINGS), 1))
+        points[:, 2] = _APART * np.arange(1, len(points) + 1)
+        self._discs.batched_positions = points.astype(np.float32)
+        self._discs.batched_scales = size.ravel().astype(np.float32)
+        faint = _DARK * (_DISC / (_DISC + _WIDER * height)) ** 2
+        self._discs.batched_opacities = np.tile(faint, len(_RINGS)).astype(np.float32)
+
+
+_DISCS = 4  # below each part of the arm
+_RINGS = (0.5, 0.75, 1.0)  # radii of the discs at one point, for a soft edge
+_DISC, _WIDER = 0.08, 0.12  # m, radius at the floor; its growth with the height
+_DARK = 0.06  # opacity of a disc at the floor
+_SHADOW_STILL = 2e-3  # m
+_APART = 2e-4  # m, between two discs, which would flicker at the same height
 
 
 class People:

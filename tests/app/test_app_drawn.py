@@ -11,10 +11,11 @@ import pytest
 
 from app.link.choice import SceneChoice
 from app.link.messages import ContactPoint, Post
+from app.link.poses import LinkPoses
 from app.panels.run.plots import touching
 from app.tab.context import PageContext
 from app.view.robot import CoverView, JointTurns
-from app.view.surroundings import ContactView, WorldView
+from app.view.surroundings import ContactView, Ground, WorldView
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import AS_PRINTED, RunSpec
@@ -59,6 +60,29 @@ class Scene:
             return handle
 
         return add
+
+
+@pytest.mark.parametrize("name", ["iiwa14", "ridgeback-ur10", "planar3"])
+def test_the_shadow_lies_on_the_floor_below_the_arm(name: str) -> None:
+    """The discs lie below the arm, from its first joint to its tip; a disc below a higher point is larger and
+    fainter; for a robot at rest nothing is sent."""
+    scene, robot = Scene(), load_robot(name)
+    ground = Ground(scene, robot, np.empty((0, 3)))  # pyright: ignore[reportArgumentType]
+    shadow, links = scene.added["/shadow"], LinkPoses(robot)
+    poses = links.at(robot.home)
+    assert poses is not None
+    ground.move(poses)
+    at = np.array(shadow.batched_positions)
+    assert (at[:, 2] > 0.0).all() and (at[:, 2] < 0.03).all()
+    for joint in poses[:-1]:
+        assert np.hypot(*(at[:, :2] - joint[:2]).T).min() < 0.01
+    assert np.hypot(*(at[:, :2] - poses[-1, :2]).T).min() < 0.3 * max(0.1, np.ptp(poses[:, :3]))
+    size, dark = np.array(shadow.batched_scales), np.array(shadow.batched_opacities)
+    one_ring = len(size) // 3
+    assert (np.diff(dark[np.argsort(size[:one_ring])]) <= 1e-6).all()
+    shadow.batched_positions = None
+    ground.move(poses + 1e-4)
+    assert shadow.batched_positions is None
 
 
 def test_contacts_are_arrows_and_the_strongest_has_a_label() -> None:
