@@ -83,7 +83,7 @@ class Viewer(Tab):
         match message["type"]:
             case "GuiUpdateMessage" if "data" in message["updates"]:
                 self.second.plots[message["uuid"]] += 1
-            case "SceneNodeUpdateMessage" | "SetPositionMessage" | "SetOrientationMessage":
+            case "SetPositionMessage" | "SetOrientationMessage":
                 self.second.links[f"{message['type']} {message.get('name')}"] += 1
             case _:
                 pass
