@@ -11,6 +11,7 @@ SHEET = 'div[style*="width: 20em"]'
 """The sheet of controls at the bottom of a phone's screen."""
 ROW = ".mantine-Flex-root"
 """A control with its label."""
+CHECKBOX = ".mantine-Checkbox-root"
 ICON_BUTTON, CLOSES_NOTICE = ".mantine-ActionIcon-root", ".mantine-Notification-closeButton"
 SCROLLS = ".mantine-ScrollArea-viewport"
 FLOATING_PANEL = '.mantine-Paper-root[style*="position: absolute"]'

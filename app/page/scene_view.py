@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import viser
 
-from app.adapter.names import CHART_BOX, FLOATING_PANEL, SHEET
+from app.adapter.names import CHART_BOX, CHECKBOX, FLOATING_PANEL, ROW, SHEET
 from app.adapter.private import unless_removed
 from app.client.moment import Moment, moment_of
 from app.client.simulation import Trouble
@@ -45,6 +45,10 @@ div:has(> div > {CHART_BOX}) > * {{ flex: 1 1 100%; min-width: 0 }}
 div:has(> div > {CHART_BOX}) > div:has(> {CHART_BOX}) {{ flex: 1 1 17em }}
 </style>"""
 """Puts charts beside each other where a panel is wide enough; viser puts all controls below each other."""
+_SWITCHES = (
+    f"<style>{ROW}:has({CHECKBOX}) > :first-child {{ width: auto !important; min-width: 6.6em }}</style>"
+)
+"""Leaves the name of a checkbox on one line; viser gives names a third of the panel."""
 _LOW = 600  # px: in a lower window the levels would cover the robot, and begin folded
 _HEAD, _ROW = 45.0, 53.0  # px: heights of the head of a panel over the scene, and of a level in it
 _ROOMY = 1100, 720  # px: in a window of this width and height, the plots stand in a row below the robot
@@ -85,7 +89,7 @@ class SceneView:
     # ---------------------------------------------------------------- building
 
     def _build_panels(self, gui: viser.GuiApi, narrow: bool) -> None:
-        gui.add_html(_PHONE + _CHARTS)
+        gui.add_html(_PHONE + _CHARTS + _SWITCHES)
         exercise = self._learner.choice_of(self.page.ready).exercise
         # On a phone, time and speed come after the question.
         with gui.add_folder(None, order=math.inf if narrow else -1.0):
