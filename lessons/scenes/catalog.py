@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import TypeVar
 
 from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
@@ -76,6 +77,11 @@ def load_scene(
         raise InputError(
             f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf, --tip, --tool and --hold"
         )
+    return _made(name)
+
+
+@lru_cache(maxsize=4)
+def _made(name: str) -> Scene:
     return velocity_scene(name) if name in VELOCITY_SCENES else _MAKERS[name]()
 
 
