@@ -21,7 +21,6 @@ import viser
 from app.adapter import private
 from app.adapter.names import STORED
 from app.adapter.private import print_exception, unless_removed
-from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from app.link.choice import SceneChoice
@@ -30,7 +29,7 @@ from app.link.process import why_not
 from app.page.page import Page
 from app.panels.run.classroom import ClassCard, add_watching
 from app.tab.comfort import ASK_MOTION, ASK_WINDOW, DARK, MOTION, NAME_TAB, REDUCED, Comfort, window_size
-from app.tab.visitor import Visitor
+from app.tab.visitor import Notebook, Visitor
 from app.web.guard import GuardedConnection
 from app.web.inlet import Inlet
 from app.web.limits import UPLOADS, Uploads

@@ -13,7 +13,6 @@ from unittest.mock import MagicMock
 import numpy as np
 import pytest
 
-from app.client.progress import Notebook
 from app.html.markdown import explained, rendered, rendered_line, split, word_count, words
 from app.html.palette import GHOST
 from app.html.text import figure, formula, joints_named, readable
@@ -23,6 +22,7 @@ from app.panels.lesson.claims import pictures, state
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.controls import STEPS, place_of, value_at
+from app.tab.visitor import Notebook
 from himpc.tasks import KINDS
 from lessons.course import COURSE, load_lesson
 from lessons.exercises import EXERCISES, load_exercise, start_of
