@@ -214,7 +214,7 @@ _SAY = """(() => {
 
 
 def _names_and_colours() -> str:
-    """JavaScript that adds names, language and style; it may run again for each scene."""
+    """JavaScript that adds names, language and style; it may run again."""
     names = _NAMES % tuple(map(json.dumps, (ROW, ICON_BUTTON, CLOSES_NOTICE, SCROLLS, CHART, FOLDED_PANEL)))
     return f"""(() => {{
 document.documentElement.lang = "en";
@@ -245,17 +245,17 @@ class Comfort:
         self._narration = Narration(time.monotonic)
 
     def set_theme(self, dark: bool) -> None:
-        """Shows the dark or the light theme, with which the browser opens its next page, too."""
+        """Shows the dark or the light theme, with which the browser opens its next page, too. Controls get
+        their names for screen readers."""
         self.dark = dark
         self._client.gui.configure_theme(dark_mode=dark, show_share_button=False, show_logo=False)
         self._client.local_storage.set_item(DARK, "1" if dark else "0")
+        private.run_script(self._client, _names_and_colours())
 
     def opened(self, learner: SimulationClient) -> None:
-        """Adds the line and the names for screen readers to a new scene, and pauses if the user wants less
-        motion."""
+        """Adds the line that says what happens to a new scene, and pauses if the user wants less motion."""
         self._narration = Narration(time.monotonic)
         self._begin()
-        private.run_script(self._client, _names_and_colours())
         if self._reduced:
             learner.send(Play(False))
 
