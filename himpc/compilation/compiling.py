@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 import os
 from collections.abc import Callable
 from importlib import import_module
@@ -50,6 +51,7 @@ def serve(module: str, only_needed: bool = False) -> None:
     from himpc.compilation.compiled import on_compiled
 
     end_with(0)
+    gc.disable()  # most of the compiler's objects are needed to the end; looking for others takes long
     # A module may print text, which must not be mixed with the reports.
     with os.fdopen(os.dup(1), "w", buffering=1) as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

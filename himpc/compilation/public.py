@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import linecache
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -69,6 +70,30 @@ def matrices(data: Any, start: int, count: int, rows: int, columns: int) -> Any:
 def borrowed(array: Any) -> Any:
     """See `views`."""
     return array
+
+
+def arrays_in(table: type, numbers: dict[str, str], wholes: dict[str, str]) -> Any:
+    """See `views`."""
+    text = f"""
+def arrays(data, where, whole, whole_where, s):
+    return {table.__name__}({_views("data", "where", numbers)}{_views("whole", "whole_where", wholes)})
+"""
+    file = f"<{table.__module__}.{table.__name__}>"  # tracebacks and debuggers show the text
+    linecache.cache[file] = len(text), None, text.splitlines(True), file
+    scope = {"vector": vector, "matrix": matrix, "matrices": matrices}
+    scope |= {"__name__": table.__module__, table.__name__: table}
+    exec(compile(text, file, "exec"), scope)
+    return inline_kernel(scope["arrays"])
+
+
+def _views(memory: str, where: str, shapes: dict[str, str]) -> str:
+    """Returns the text of the views of all arrays in a memory: "matrix(data, where[3], s.N, 4), ..."."""
+    text = ""
+    for index, shape in enumerate(shapes.values()):
+        sizes = [size if size.isdecimal() else f"s.{size}" for size in shape.split()]
+        view = ("vector", "matrix", "matrices")[len(sizes) - 1]
+        text += f"{view}({memory}, {where}[{index}], {', '.join(sizes)}), "
+    return text
 
 
 def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, list[str]]:

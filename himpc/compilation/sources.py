@@ -31,9 +31,7 @@ def sources_of(function: Callable[..., Any]) -> list[Path]:
     packages = {piece.__module__.partition(".")[0] for piece in (function, *filter(None, pieces))} | {
         _PACKAGE
     }
-    # The text of a function of `as_function` is made by its module, which is then the file to begin with.
-    file = Path(function.__code__.co_filename)
-    files = {file if file.is_file() else Path(str(sys.modules[function.__module__].__file__))}
+    files = {Path(function.__code__.co_filename)}
     waiting = [*files]
     files.update(Path(__file__).parent.glob("*.py"))
     while waiting:

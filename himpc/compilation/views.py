@@ -3,7 +3,6 @@ owns."""
 
 from __future__ import annotations
 
-import linecache
 from typing import Any, get_type_hints
 
 from himpc.compilation import public_only
@@ -22,14 +21,11 @@ matrices: Any = chain.matrices
 borrowed: Any = chain.borrowed
 """(array): returns a view of the whole array."""
 
-_VIEW = {1: "vector", 2: "matrix", 3: "matrices"}
-
-
-def view(memory: str, start: str, shape: str) -> str:
-    """Returns the text of a view: `view("data", "where[3]", "N 4")` is "matrix(data, where[3], s.N, 4)".
-    s contains the values of the letters."""
-    sizes = [size if size.isdecimal() else f"s.{size}" for size in shape.split()]
-    return f"{_VIEW[len(sizes)]}({memory}, {start}, {', '.join(sizes)})"
+arrays_in: Any = chain.arrays_in
+"""(table, numbers, wholes): returns a function (data, where, whole, whole_where, s) that returns all arrays
+of a table as views. `table` is the class with the arrays' names; numbers and wholes contain the shapes of its
+arrays of real and of whole numbers by name, see `shapes_of`; `where` and `whole_where` contain the index at
+which each array begins in `data` and in `whole`; s contains the values of the letters in the shapes."""
 
 
 def shapes_of(table: type, kind: Any) -> dict[str, str]:
@@ -37,24 +33,3 @@ def shapes_of(table: type, kind: Any) -> dict[str, str]:
     Annotated[kind, shape, …]."""
     hints = get_type_hints(table, include_extras=True)
     return {name: hint.__metadata__[0] for name, hint in hints.items() if hint.__origin__ == kind}
-
-
-def views(memory: str, where: str, shapes: dict[str, str]) -> str:
-    """Returns the text of the views of all arrays in a memory, separated by commas. `where` is the name of
-    the array with the index at which each array begins, in the order of the shapes."""
-    return ", ".join(view(memory, f"{where}[{index}]", shape) for index, shape in enumerate(shapes.values()))
-
-
-def as_function(name: str, module: str, text: str, **names: Any) -> Any:
-    """Returns the function that a text with views defines.
-
-    Args:
-        name, module: names of the function and of its module.
-        text: the definition; tracebacks and debuggers show it.
-        names: what the text uses besides views.
-    """
-    file = f"<{module}.{name}>"
-    linecache.cache[file] = len(text), None, text.splitlines(True), file
-    scope = {"__name__": module, "vector": vector, "matrix": matrix, "matrices": matrices, **names}
-    exec(compile(text, file, "exec"), scope)
-    return scope[name]

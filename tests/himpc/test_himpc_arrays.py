@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import get_type_hints
 
 import numpy as np
 import pytest
 
 import himpc.tick
 from himpc.export.kernel import loop_arrays
-from himpc.tick.kernel import arrays
 from himpc.tick.kernel.arena import laid_out
 from himpc.tick.kernel.arrays import TickArrays
 from himpc.tick.tables import sizes
@@ -23,35 +22,40 @@ FILES = [(path.stem, path.read_text()) for path in FOLDER.rglob("*.py") if path.
 HINTS = get_type_hints(TickArrays, include_extras=True)
 
 
-def in_python(patch: pytest.MonkeyPatch, compiled: Any, sizes_of: Callable[..., Any]) -> Any:
-    """Returns a function that makes views, in Python instead of compiled."""
-    function = compiled.py_func
-    for name, dimensions in (("vector", 1), ("matrix", 2), ("matrices", 3)):
+LOOK = """
+from himpc.compilation.compiled import INDICES, TABLE, VECTOR, kernel
+from himpc.export.kernel.loop_arrays import loop_arrays_of
+from himpc.tick.kernel.arrays import arrays_of
 
-        def view(data: np.ndarray, start: int, *shape: int, dimensions: int = dimensions) -> np.ndarray:
-            assert len(shape) == dimensions
-            return data[start : start + int(np.prod(shape))].reshape(shape)
-
-        patch.setitem(function.__globals__, name, view)
-    patch.setitem(function.__globals__, "sizes_of", sizes_of)
-    return function
+@kernel(VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, TABLE)
+def look(data, where, whole, whole_where, loop, loop_where, out):
+    t = arrays_of(data, where, whole, whole_where)
+    p = loop_arrays_of(loop, loop_where, t)
+"""
 
 
 @pytest.mark.quick
-def test_every_view_is_the_array_of_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`arrays_of` and the arena agree on the index and the shape of every array; so do `loop_arrays_of` and
+def test_every_view_is_the_array_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`arrays_of` and the arena agree on the address and the shape of every array; so do `loop_arrays_of` and
     the memory of an export."""
-    arrays_of = in_python(monkeypatch, arrays.arrays_of, arrays.sizes_of)
     arena = sizes(n=7, N=5, rows=11, solved=9, levels=3, bounds=15, tasks=4, frames=2, python_rows=6)
-    tick = arrays_of(*arena.arguments)
-    loop_arrays_of = in_python(monkeypatch, loop_arrays.loop_arrays_of, loop_arrays.sizes_of)
     letters = loop_arrays.sizes_of(7, 5, 11, 3, 4, 15)
     loop, where, loop_views = laid_out(loop_arrays.SHAPES, letters._asdict(), float)
     loop_views["setup"][loop_arrays.LEVELS] = 3
-    for found, wanted in ((tick, arena.f | arena.i), (loop_arrays_of(loop, where, tick), loop_views)):
-        for name, view in found._asdict().items():
-            assert view.shape == wanted[name].shape, name
-            assert view.ctypes.data == wanted[name].ctypes.data, name
+    wanted = [(f"t.{name}", array) for name, array in (arena.f | arena.i).items()]
+    wanted += [(f"p.{name}", array) for name, array in loop_views.items()]
+    text = LOOK
+    for index, (name, array) in enumerate(wanted):
+        text += f"    out[{index}, 0] = {name}.ctypes.data\n"
+        for d in range(array.ndim):
+            text += f"    out[{index}, {1 + d}] = {name}.shape[{d}]\n"
+    (tmp_path / "look_at_views.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    found = np.zeros((len(wanted), 4), np.int64)
+    import_module("look_at_views").look(*arena.arguments, loop, where, found)
+    for (name, array), (address, *shape) in zip(wanted, found.tolist(), strict=True):
+        assert tuple(shape[: array.ndim]) == array.shape, name
+        assert address == array.ctypes.data, name
 
 
 @pytest.mark.quick

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 from himpc.compilation.compiled import always_inline_kernel
-from himpc.compilation.views import as_function, shapes_of, views
+from himpc.compilation.views import arrays_in, shapes_of
 from himpc.tick.kernel.arrays import Array, IntArray, TickArrays
 
 
@@ -97,20 +96,14 @@ def sizes_of(n: int, N: int, M: int, r: int, T: int, b: int) -> LoopSizes:
     return LoopSizes(n, N, N + 1, M, r, T, b, 1 << r, max(9, widest), max(19, 4 * widest + 1), 3 + 3 * widest)
 
 
-loop_arrays_of: Callable[[Array, IntArray, TickArrays], LoopArrays] = always_inline_kernel(
-    as_function(
-        "loop_arrays_of",
-        __name__,
-        f"""
-def loop_arrays_of(loop, where, t):
+_compiled_sizes = always_inline_kernel(sizes_of)
+_loop_arrays = arrays_in(LoopArrays, SHAPES, {})
+
+
+@always_inline_kernel
+def loop_arrays_of(loop: Array, where: IntArray, t: TickArrays) -> LoopArrays:
+    """Returns all arrays as views. `loop` contains the numbers of all arrays, `where` the index at which each
+    array begins, in the order of `SHAPES`; the arrays of a tick determine the sizes."""
     N, n = t.fixed.shape
-    s = sizes_of(n, N, t.sizes[2], int(loop[where[0] + LEVELS]), len(t.task), len(t.L))
-    return LoopArrays({views("loop", "where", SHAPES)})
-""",
-        LoopArrays=LoopArrays,
-        LEVELS=LEVELS,
-        sizes_of=always_inline_kernel(sizes_of),
-    )
-)
-"""(loop, where, t): returns all arrays as views. `loop` contains the numbers of all arrays, `where` the index
-at which each array begins, in the order of `SHAPES`; the arrays of a tick determine the sizes."""
+    s = _compiled_sizes(n, N, t.sizes[2], int(loop[where[0] + LEVELS]), len(t.task), len(t.L))
+    return _loop_arrays(loop, where, where, where, s)

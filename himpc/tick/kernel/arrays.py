@@ -4,14 +4,13 @@ functions use follow from this table."""
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.compilation.compiled import always_inline_kernel
-from himpc.compilation.views import as_function, shapes_of, view, views
+from himpc.compilation.views import arrays_in, shapes_of, vector
 
 Array = NDArray[np.float64]
 IntArray = Any
@@ -232,21 +231,17 @@ def sizes_of(s: IntArray) -> Sizes:
     return Sizes(n, N, N + 1, M, r, T, F, G, s[12], b, max(s[11], 1), w, w + 1)
 
 
-arrays_of: Callable[[Array, IntArray, IntArray, IntArray], TickArrays] = always_inline_kernel(
-    as_function(
-        "arrays_of",
-        __name__,
-        f"""
-def arrays_of(data, where, whole, whole_where):
-    s = sizes_of({view("whole", f"whole_where[{WHOLE_AT['sizes']}]", WHOLES["sizes"])})
-    return TickArrays({views("data", "where", NUMBERS)}, {views("whole", "whole_where", WHOLES)})
-""",
-        TickArrays=TickArrays,
-        sizes_of=always_inline_kernel(sizes_of),
-    )
-)
-"""(data, where, whole, whole_where): returns all arrays of an arena as views. Views that a compiled function
-does not use cost no time."""
+_compiled_sizes = always_inline_kernel(sizes_of)
+_tick_arrays = arrays_in(TickArrays, NUMBERS, WHOLES)
+_SIZES, _COUNT = WHOLE_AT["sizes"], int(WHOLES["sizes"])
+
+
+@always_inline_kernel
+def arrays_of(data: Array, where: IntArray, whole: IntArray, whole_where: IntArray) -> TickArrays:
+    """Returns all arrays of an arena as views. Views that a compiled function does not use cost no time."""
+    s = _compiled_sizes(vector(whole, whole_where[_SIZES], _COUNT))
+    return _tick_arrays(data, where, whole, whole_where, s)
+
 
 PERIOD, T_S, REACTION, NOW, PULL = range(5)
 """Indices of `scalars`: duration of the previous period (s), duration of this period (s), the reaction of

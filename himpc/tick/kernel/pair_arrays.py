@@ -4,11 +4,10 @@ functions use follow from this table."""
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 from himpc.compilation.compiled import always_inline_kernel
-from himpc.compilation.views import as_function, shapes_of, views
+from himpc.compilation.views import arrays_in, shapes_of, vector
 from himpc.tick.kernel.arrays import Array, IntArray
 
 
@@ -93,18 +92,11 @@ def pair_sizes(s: IntArray) -> PairSizes:
     return PairSizes(s[0], s[1], s[2], s[3], s[4], s[5], s[0] + s[5], s[0] + s[5] + 1)
 
 
-pair_arrays_of: Callable[[Array, IntArray, IntArray, IntArray], PairArrays] = always_inline_kernel(
-    as_function(
-        "pair_arrays_of",
-        __name__,
-        f"""
-def pair_arrays_of(data, where, whole, whole_where):
-    s = pair_sizes(vector(whole, whole_where[0], 6))
-    return PairArrays({views("data", "where", PAIR_NUMBERS)}, {views("whole", "whole_where", PAIR_WHOLES)})
-""",
-        PairArrays=PairArrays,
-        pair_sizes=always_inline_kernel(pair_sizes),
-    )
-)
-"""(data, where, whole, whole_where): returns all arrays as views; the arguments are those of
-`himpc.tick.kernel.arrays.arrays_of`."""
+_compiled_sizes = always_inline_kernel(pair_sizes)
+_pair_arrays = arrays_in(PairArrays, PAIR_NUMBERS, PAIR_WHOLES)
+
+
+@always_inline_kernel
+def pair_arrays_of(data: Array, where: IntArray, whole: IntArray, whole_where: IntArray) -> PairArrays:
+    """Returns all arrays as views; the arguments are those of `himpc.tick.kernel.arrays.arrays_of`."""
+    return _pair_arrays(data, where, whole, whole_where, _compiled_sizes(vector(whole, whole_where[0], 6)))
