@@ -169,6 +169,12 @@ def test_unlimited_speed_and_effort_are_filled() -> None:
         assert "no effort limit" in told
 
 
+@pytest.mark.parametrize(("kind", "unit"), [("revolute", "kg·m²"), ("prismatic", "(sliding joints: kg)")])
+def test_the_report_says_from_what_the_rotors_were_assumed(kind: str, unit: str) -> None:
+    told = str(load(two_joint_arm(j2=joint("j2", "l1", "l2", kind))).report.of_kind("filled"))
+    assert f"{unit} were assumed from what they move and from their torque and speed limits" in told
+
+
 def test_an_effort_that_hardly_holds_the_arm_is_reported_and_kept() -> None:
     """Real arms hold less than their whole range; home is a posture that the motors hold easily."""
     strong, weak = load(ARM), load(ARM.replace('effort="50"', 'effort="4"'))
