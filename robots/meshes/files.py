@@ -43,7 +43,7 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
     paths. within: folder that must contain all meshes that are not installed; None: they may be anywhere.
     """
     missing: dict[str, str] = {}
-    stood_in: dict[str, Path] = {}
+    stood_in: dict[tuple[Path, str], dict[str, None]] = {}
     for link in root.findall("link"):
         for shape in (*link.findall("visual"), *link.findall("collision")):
             mesh = shape.find("geometry/mesh")
@@ -57,13 +57,14 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
             if path is not None:
                 mesh.set("filename", str(path))
                 if place is not None:
-                    what = f"package '{shortened(package)}'" if package else f"path of '{shortened(uri)}'"
-                    stood_in[what] = place
+                    stood_in.setdefault((place, package), {})[uri] = None
                 continue
             link.remove(shape)
             if shape.tag == "visual":
                 missing[uri] = package
-    for what, place in list(stood_in.items())[:_STAND_INS]:
+    for (place, package), uris in list(stood_in.items())[:_STAND_INS]:
+        what = f"package '{shortened(package)}'" if package else f"path of {len(uris)} mesh file(s) "
+        what += "" if package else f"({listed(uris, 3)})"
         yield Finding("note", "meshes", f"the folder '{shortened(place.name)}' stood in for the {what}")
     if missing:
         text = f"{len(missing)} mesh file(s) not found ({listed(missing)}); capsules are drawn instead"
