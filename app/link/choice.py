@@ -29,7 +29,7 @@ class SceneChoice:
         run: scene, robot, settings and seed. For a lesson these are the values of the step, with the step's
             script; the scene is empty until the lesson's file has been read. The controller is an assignment
             in `set`, not in `controller`. Only the paths in `files` are opened.
-        urdf_text: the text of an uploaded URDF, or the bytes of an uploaded zip, which replaces the robot of
+        urdf_text: the text of a URDF, or the bytes of an upload, a URDF or a zip, which replaces the robot of
             the run.
         exercise: the step of a lesson, if the choice is one.
         mine: the learner's changes to that step, as assignments; they are applied once when the step is

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import viser
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from app.web.class_file import ClassFile
 
 _KEY = "himpc-lab-place"
+_DROP = files("app.tab").joinpath("dropped.js").read_text("utf-8")
 
 
 def place_asked(key: str) -> str:
@@ -233,6 +235,7 @@ class Visit:
         answer is treated as a new browser."""
         private.run_script(self._client, NAME_TAB)
         private.run_script(self._client, ASK_MOTION)
+        private.run_script(self._client, _DROP)
         here = f"himpc-lab-place-{secrets.token_hex(8)}"
         size = f"{here}-window"
         private.run_script(self._client, place_asked(here))

@@ -30,6 +30,7 @@ _REST = 1.0  # s: least part of this time after the target, which moves with a l
 FOLLOWS = 0.01  # largest error, as a share of the drag, of a robot that follows
 _MARGIN = 0.02  # rad or m: nearest that a joint comes to its limit at a target
 _NEAR = 2e-3  # m: difference from the distance to keep at which it holds a robot back
+_FAST = 0.8  # share of a speed limit at which a joint counts as held back by it
 _STILL = 0.01  # largest speed, as a share of its limit, of a joint at rest
 _SECONDS = 120.0  # s of processor time for a drag
 
@@ -131,8 +132,9 @@ def _at_limits(plant: Plant, distance: float, kept: float) -> str:
     robot = plant.robot
     at_torque = np.abs(plant.tau) > 0.99 * robot.tau_limit
     near = np.minimum(plant.q - robot.q_lower, robot.q_upper - plant.q) < _MARGIN
+    fast = np.abs(plant.v) > _FAST * robot.v_limit
     touching = dict.fromkeys(" touches ".join(map(shortened, contact.between)) for contact in plant.contacts)
-    limits = (("torque", at_torque), ("position", near))
+    limits = (("torque", at_torque), ("position", near), ("speed", fast))
     notes = [
         f"{listed(list(compress(robot.joint_names, reached)))} at the {what} limit"
         for what, reached in limits

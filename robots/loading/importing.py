@@ -15,7 +15,7 @@ from lxml.etree import _Element as Element
 
 from robots.errors import InputError
 from robots.inertia import SLOW, mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
-from robots.joints import chain_length, joint_names
+from robots.joints import chain_length, joint_axis, joint_names, own_joints
 from robots.loading.home import find_home, sensible_a_max
 from robots.loading.imported import with_collision
 from robots.meshes.files import has_meshes
@@ -179,8 +179,11 @@ def _assumed(model: pin.Model, given: np.ndarray, home: np.ndarray, M_bar: np.nd
     """Yields what was assumed about the rotors, and whether the robot will be slow all the same."""
     values = ", ".join(f"{value:g}" for value, own in zip(model.armature, given, strict=True) if own <= 0.0)
     if values:
-        text = f"their inertia is not described; {values} kg·m² were assumed, plant.armature changes them"
-        yield Finding("filled", "rotors", text)
+        slides = any(joint_axis(model, joint)[0] for joint in own_joints(model))
+        unit = "kg·m² (sliding joints: kg)" if slides else "kg·m²"
+        text = f"their inertia is not described; {values} {unit} were assumed from what they move and from"
+        text += " their torque and speed limits"
+        yield Finding("filled", "rotors", f"{text}, plant.armature changes them")
     bandwidth = tracking_bandwidth(mass_matrix(model, model.createData(), home), M_bar, 1e-3)
     if bandwidth < SLOW:
         text = (

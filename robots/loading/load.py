@@ -23,6 +23,7 @@ from robots.robot import Robot
 from robots.urdf import load_bytes
 
 _SHORT = 200_000  # bytes; the robots of the last four files up to this size stay in memory
+_ZIP = b"PK"  # the first bytes of a zip
 _GEOMETRY = Allowance(24.0)
 """For the meshes of a robot, their hulls and capsules. At most 8 s are for reading (`READING`)."""
 
@@ -57,17 +58,18 @@ def load_robot(
 
 
 def load_urdf_text(text: str | bytes, tip: str | None = None, hold: tuple[str, ...] = ()) -> Robot:
-    """Returns the robot that a URDF string describes: an upload, or a stored canonical text. Bytes are an
-    uploaded zip with the robot's folder.
+    """Returns the robot that a URDF describes: an upload, or a stored canonical text. Bytes may also be a zip
+    with the robot's folder.
 
     The description can use the meshes in the zip, those of installed packages, by `package://`, and no other
     files.
 
     Raises InputError like `load_robot`.
     """
-    if isinstance(text, bytes):
-        return _import_zip(text, "the zip", lambda _: "leave only one of them in the zip", tip, hold).used()
-    return _import(text.encode(errors="replace"), "the URDF text", None, tip, None, hold).used()
+    data = text.encode(errors="replace") if isinstance(text, str) else text
+    if data.startswith(_ZIP):
+        return _import_zip(data, "the zip", lambda _: "leave only one of them in the zip", tip, hold).used()
+    return _import(data, "the URDF text", None, tip, None, hold).used()
 
 
 def check_urdf(path: str | Path, hold: tuple[str, ...] = ()) -> ImportReport:

@@ -32,6 +32,7 @@ ur_description xarm_description z1_description"""
 """The packages with meshes that the extra `meshes` installs."""
 
 _PLACES = "the folder of the URDF and all folders above it, the ROS package path, and the installed packages"
+_DEEPEST = 5  # largest number of folders and file that the end of a path may have
 _STAND_INS = 20  # largest number of findings about folders that stood in
 
 
@@ -42,7 +43,7 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
     paths. within: folder that must contain all meshes that are not installed; None: they may be anywhere.
     """
     missing: dict[str, str] = {}
-    stood_in: dict[str, Path] = {}
+    stood_in: dict[tuple[Path, str], dict[str, None]] = {}
     for link in root.findall("link"):
         for shape in (*link.findall("visual"), *link.findall("collision")):
             mesh = shape.find("geometry/mesh")
@@ -56,13 +57,14 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
             if path is not None:
                 mesh.set("filename", str(path))
                 if place is not None:
-                    what = f"package '{shortened(package)}'" if package else f"path of '{shortened(uri)}'"
-                    stood_in[what] = place
+                    stood_in.setdefault((place, package), {})[uri] = None
                 continue
             link.remove(shape)
             if shape.tag == "visual":
                 missing[uri] = package
-    for what, place in list(stood_in.items())[:_STAND_INS]:
+    for (place, package), uris in list(stood_in.items())[:_STAND_INS]:
+        what = f"package '{shortened(package)}'" if package else f"path of {len(uris)} mesh file(s) "
+        what += "" if package else f"({listed(uris, 3)})"
         yield Finding("note", "meshes", f"the folder '{shortened(place.name)}' stood in for the {what}")
     if missing:
         text = f"{len(missing)} mesh file(s) not found ({listed(missing)}); capsules are drawn instead"
@@ -118,15 +120,15 @@ def find_mesh(uri: str, folder: Path) -> Path | None:
 
 def _stand_ins(uri: str, folder: Path) -> Iterator[tuple[Path, Path | None]]:
     """Yields a folder and the file in it that may be meant by a URI whose package, or whose path on another
-    machine, does not exist: the path without the package's name in the parent folders, then the file's name
-    beside the URDF and in a folder `meshes`."""
-    parts = _package_parts(uri)
-    if parts is not None:
+    machine, does not exist: the longest end of the path that exists in the parent folders, then the file's
+    name beside the URDF and in a folder `meshes`."""
+    path = PurePosixPath(unquote(uri.partition("://")[2] or uri.replace("\\", "/")))
+    parts = [part for part in path.parts if part not in ("..", "/") and "\0" not in part][-_DEEPEST:]
+    for first in range(len(parts) - 1):
         for place in (folder, *folder.parents):
-            yield place, _existing(place / parts[1])
-    name = PurePosixPath(uri.replace("\\", "/")).name
-    for place in (folder, folder / "meshes", folder.parent / "meshes") if "\0" not in uri else ():
-        yield place, _existing(place / name)
+            yield place, _existing(place.joinpath(*parts[first:]))
+    for place in (folder, folder / "meshes", folder.parent / "meshes") if parts else ():
+        yield place, _existing(place / parts[-1])
 
 
 def _package_parts(uri: str) -> tuple[str, str] | None:

@@ -14,7 +14,7 @@ from lxml.etree import _Element as Element
 from robots.errors import listed, shortened
 from robots.meshes.files import mesh_file
 from robots.report import Finding
-from robots.urdf.read import MAX_BYTES, Refusal, load_bytes, parser
+from robots.urdf.read import MAX_BYTES, Refusal, load_bytes, read_xml
 
 _INCLUDES = 100
 _LARGE = 50.0
@@ -52,8 +52,9 @@ def compiled_mjcf(
 
     Raises Refusal for a model that cannot be read or compiled.
     """
-    root = _parsed(data, source)
-    _include(root, source, folder, within)
+    findings: list[Finding] = []
+    root = _parsed(data, source, findings)
+    _include(root, source, folder, within, findings)
     if next(root.iter("attach", "model"), None) is not None:
         raise Refusal(source, "it attaches other models; give the whole model (MuJoCo's `MjSpec.to_xml`)")
     keys = tuple((key.get("name", ""), key.get("qpos", "")) for key in root.iterfind("keyframe/key"))
@@ -83,18 +84,15 @@ def compiled_mjcf(
                 f"its meshes have {size:.0f} MB, perhaps more than the import's memory is for: simplify them"
             )
         raise Refusal(source, f"MuJoCo cannot compile it ({reason}); {advice}") from None
-    found = (Finding("repaired", source, _RADIANS),) if turns else ()
+    findings += [Finding("repaired", source, _RADIANS)] if turns else []
     text = f"{len(missing)} mesh file(s) not found ({listed(missing.values())})"
     text += "" if folder else "; a zip of the robot's folder brings them along"
-    found = (*found, Finding("note", "meshes", text)) if missing else found
-    return Compiled(spec.modelname, model, meshes, keys, found)
+    findings += [Finding("note", "meshes", text)] if missing else []
+    return Compiled(spec.modelname, model, meshes, keys, tuple(findings))
 
 
-def _parsed(data: bytes, source: str) -> Element:
-    try:
-        root = etree.fromstring(data, parser())
-    except (etree.XMLSyntaxError, ValueError) as error:
-        raise Refusal(source, f"this is not well-formed XML ({shortened(str(error), 100)})") from None
+def _parsed(data: bytes, source: str, findings: list[Finding]) -> Element:
+    root = read_xml(data, source, findings)
     if len(data) > MAX_BYTES or root.getroottree().docinfo.doctype:
         raise Refusal(
             source, f"it has a DOCTYPE or more than {MAX_BYTES / 1e6:.0f} MB; remove what is not needed"
@@ -102,7 +100,9 @@ def _parsed(data: bytes, source: str) -> Element:
     return root
 
 
-def _include(root: Element, source: str, folder: Path | None, within: Path | None) -> None:
+def _include(
+    root: Element, source: str, folder: Path | None, within: Path | None, findings: list[Finding]
+) -> None:
     """Replaces each `include` by the content of its file. As in MuJoCo, paths are relative to the main
     file."""
     for _ in range(_INCLUDES):
@@ -113,9 +113,15 @@ def _include(root: Element, source: str, folder: Path | None, within: Path | Non
         name = element.get("file", "")
         _, path = mesh_file(name, folder, within)
         if path is None:
-            hint = "is not found" if folder else "is not part of an upload; upload a zip of its folder"
+            hint = (
+                "is not found; put it beside the model"
+                if folder
+                else "is not part of an upload; upload a zip of its folder"
+            )
             raise Refusal(source, f"the included file '{shortened(name)}' {hint}")
-        parent[parent.index(element) : parent.index(element) + 1] = [*_parsed(load_bytes(path), source)]
+        parent[parent.index(element) : parent.index(element) + 1] = [
+            *_parsed(load_bytes(path), shortened(name), findings)
+        ]
     raise Refusal(source, f"it includes more than {_INCLUDES} files, or a file includes itself")
 
 

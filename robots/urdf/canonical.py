@@ -18,7 +18,7 @@ from robots.meshes.files import localise
 from robots.report import Finding, ImportReport
 from robots.urdf.hold import MAX_JOINTS, held_by_name, hold_what_does_not_move
 from robots.urdf.inertials import ASSUMED, repair_inertials
-from robots.urdf.joints import HELD, coupling, normalise_joints, settle_followers
+from robots.urdf.joints import GRIPPER, HELD, coupling, normalise_joints, settle_followers
 from robots.urdf.limits import fill_efforts, fill_speeds, fit_masses
 from robots.urdf.read import Refusal, named, parse, without_shapes
 from robots.urdf.shapes import remove_unusable_shapes
@@ -90,7 +90,8 @@ def canonicalise(
         for inertial in root.iterfind("link/inertial"):
             inertial.attrib.pop(ASSUMED, None)
         for joint in root.iterfind("joint"):
-            joint.attrib.pop(HELD, None)
+            for attribute in (HELD, GRIPPER):
+                joint.attrib.pop(attribute, None)
         model = pinocchio_model(root)
         findings.extend(fill_efforts(root, model))
     except Refusal as refusal:

@@ -33,6 +33,9 @@ _GRIPPER_JOINT = re.compile(r"finger|knuckle|gripper|thumb|jaw", re.IGNORECASE)
 _GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" also names whole hands
 HELD = "held"
 """Attribute with the value at which a joint was made fixed; the canonical form does not have it."""
+GRIPPER = "gripper"
+"""Attribute of a joint of a gripper, which is held or follows such a joint; the canonical form does not have
+it."""
 
 
 def normalise_joints(root: Element, held: dict[str, tuple[float, str]]) -> Iterator[Finding]:
@@ -42,6 +45,7 @@ def normalise_joints(root: Element, held: dict[str, tuple[float, str]]) -> Itera
     """
     try:
         frozen, unlimited = _to_freeze(root, held), _without_range(root)
+        _mark_grippers(root, frozen.keys() - held.keys())
     except Refusal as refusal:
         yield refusal.finding
         return
@@ -62,6 +66,15 @@ def normalise_joints(root: Element, held: dict[str, tuple[float, str]]) -> Itera
                 yield from _freeze_if_stuck(joint)
         except Refusal as refusal:
             yield refusal.finding
+
+
+def _mark_grippers(root: Element, driven: set[str]) -> None:
+    """Marks the joints with these names, and those that follow them."""
+    joints = named(root, "joint")
+    for name, joint in joints.items():
+        joint.attrib.pop(GRIPPER, None)
+        if name in driven or (joint.find("mimic") is not None and _first_leader(joint, joints) in driven):
+            joint.set(GRIPPER, "true")
 
 
 def freeze(joint: Element, value: float, reason: str) -> Finding:
@@ -92,14 +105,17 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
 def settle_followers(root: Element) -> Iterator[Finding]:
     """Decides for each joint that follows (mimics) another one whether it moves.
 
-    A follower of a moving joint moves: its element `mimic` then names a joint with a coordinate of its own,
-    and the range of this joint is cut so that the follower stays in its own range. It is fixed if its leader
-    is held, at multiplier · q + offset, where q is the value at which the leader is held; or if the motion
-    cannot be simulated. The leader is then thought to be at the file's home, or at 0, within its limits.
+    Of joints that move together, the first in the tree gets the coordinate. A follower of a moving joint
+    moves: its element `mimic` then names a joint with a coordinate of its own, and the range of this joint is
+    cut so that the follower stays in its own range. It is fixed if its leader is held, at multiplier · q +
+    offset, where q is the value at which the leader is held; or if the motion cannot be simulated. The leader
+    is then thought to be at the file's home, or at 0, within its limits.
     """
-    joints, following = named(root, "joint"), {joint.get("name", ""): joint for joint in followers(root)}
+    joints, places = named(root, "joint"), _places(root) if followers(root) else {}
+    yield from _turned_around(root, places)
+    following = {joint.get("name", ""): joint for joint in followers(root)}
     moving = {joint.get("name", "") for joint in movable_joints(root)}
-    places, settled = _places(root) if following else {}, set[str]()
+    settled = set[str]()
     for first in list(following):
         chain: dict[str, None] = {}
         name = first
@@ -120,6 +136,39 @@ def settle_followers(root: Element) -> Iterator[Finding]:
                 yield refusal.finding
             if leader in moving:
                 moving.add(each)
+
+
+def _turned_around(root: Element, places: dict[str, int]) -> Iterator[Finding]:
+    """Makes a joint that comes before its leader in Pinocchio's tree the leader: q = (p − offset) /
+    multiplier. Its effort limit and rotor inertia become those of the leader, as it moves."""
+    joints, moving = named(root, "joint"), {joint.get("name", "") for joint in movable_joints(root)}
+    for joint in sorted(followers(root), key=lambda each: places.get(each.get("name", ""), 0)):
+        name, leader, seen = joint.get("name", ""), _leader(joint), set[str]()
+        try:
+            _, factor, offset = coupling(joint)
+            while leader in joints and leader not in moving and leader not in seen:
+                seen.add(leader)
+                leader, first, start = coupling(joints[leader])
+                factor, offset = factor * first, factor * start + offset
+            if leader not in moving or places.get(name, 0) >= places.get(leader, 0):
+                continue
+            if not _FACTORS[0] <= abs(factor) <= _FACTORS[1] or abs(offset) >= UNBOUNDED:
+                continue
+            limit, led = _require(joint, "limit"), joints[leader]
+            effort = limit_value(_require(led, "limit"), "effort") / abs(factor)
+        except Refusal:  # it is told where the joint is settled
+            continue
+        _drop(joint, "mimic")
+        limit.set("effort", repr(effort))
+        if (rotor := led.find("dynamics")) is not None:
+            _drop(joint, "dynamics")
+            inertia = float(rotor.get("armature", "0")) / factor**2
+            etree.SubElement(joint, "dynamics", damping="0", armature=repr(inertia))
+        told = {"multiplier": repr(1.0 / factor), "offset": repr((0.0 - offset) / factor)}
+        etree.SubElement(led, "mimic", joint=name, **told)
+        moving = moving - {leader} | {name}
+        text = f"it leads '{shortened(leader)}', which the file says it follows: it comes first in the tree"
+        yield Finding("note", label(joint), text)
 
 
 def coupling(follower: Element) -> tuple[str, float, float]:
@@ -158,10 +207,10 @@ def _cannot_follow(joint: Element, leads: Element | None, places: dict[str, int]
     if leads.find("mimic") is not None:
         leader, first, start = coupling(leads)
         factor, offset = factor * first, factor * start + offset
-    if places.get(joint.get("name", ""), 0) <= places.get(leader, len(places)):
-        return "its leader comes after it in the tree"
     if not _FACTORS[0] <= abs(factor) <= _FACTORS[1] or abs(offset) >= UNBOUNDED:
         return "its factor or its offset is out of range"
+    if places.get(joint.get("name", ""), 0) <= places.get(leader, len(places)):
+        return "its leader comes after it in the tree"
     if count >= _MOST_FOLLOWERS:
         return f"only {_MOST_FOLLOWERS} joints can follow others"
     mimic = _require(joint, "mimic")
@@ -204,7 +253,7 @@ def _led(joint: Element, leader: str, leads: Element | None, moves: bool, why_no
         q = float(leads.get(HELD, "0"))
     else:
         q = float(np.clip(resting(leads), *_ends(_require(leads, "limit"))))
-    reason = f"it mimics '{shortened(leader)}'"
+    reason = f"it mimics '{shortened(leader)}'" + (", which does not exist" if leads is None else "")
     if moves:
         reason = (
             f"it should follow '{shortened(leader)}' with factor {factor:g}, which is not simulated "
@@ -320,6 +369,9 @@ def _limits(joint: Element, without_range: bool) -> Iterator[Finding]:
         lower, upper = -UNBOUNDED, UNBOUNDED
         text = "its position limits are 0, a usual result of CAD exporters; it is treated as unbounded"
         yield Finding("filled", label(joint), text)
+        limit.set("lower", repr(lower))
+        limit.set("upper", repr(upper))
+        return
     if lower > upper:
         lower, upper = upper, lower
         yield Finding(
@@ -332,7 +384,9 @@ def _limits(joint: Element, without_range: bool) -> Iterator[Finding]:
             lower, upper = -UNBOUNDED, UNBOUNDED
         yield Finding("note", label(joint), f"a limit of {UNBOUNDED:.0g} or more means that it is unbounded")
     elif joint.get("type") == "revolute" and max(map(abs, bounded)) > _TURNS:
-        text = f"its range [{lower:.4g}, {upper:.4g}] rad looks like degrees; a URDF has radians"
+        text = (
+            f"its range [{lower:.4g}, {upper:.4g}] rad looks like degrees; a URDF has radians: divide by 57.3"
+        )
         yield Finding("note", label(joint), text)
     limit.set("lower", repr(lower))
     limit.set("upper", repr(upper))

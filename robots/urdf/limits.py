@@ -48,6 +48,7 @@ def fill_speeds(root: Element) -> Iterator[Finding]:
                 yield Finding("filled", label(joint), f"no velocity limit; {speed:.3g} {unit} was used")
             elif joint.get("type") != "prismatic" and given > _FASTEST:
                 text = f"its velocity limit {given:.4g} rad/s looks like degrees; a URDF has radians"
+                text += ": divide by 57.3"
                 yield Finding("note", label(joint), text)
             effort = limit_value(limit, "effort")
             if effort < _LEAST or np.isinf(effort):

@@ -25,6 +25,9 @@ _EXPAND = "run `pip install xacro`, then `xacro FILE > robot.urdf`, and give the
 _XACRO_HINT = f"; this is a xacro template: {_EXPAND}"
 _HARMLESS = (80, 201)  # libxml2: two hyphens in a comment; a prefix without a namespace
 _BEFORE_XML = re.compile(rb"\A(?:\s|<!--(?:(?!-->).)*-->)+(?=<\?xml)", re.DOTALL)
+_DECLARED = re.compile(rb"""[^>]*encoding=["']([^"']*)""")
+_LATIN_OR_UTF_8 = re.compile(rb"utf-?8|(us-)?ascii|(iso-?8859|latin)[-_]?1", re.IGNORECASE)
+_BARE = re.compile(rb"&(?!(?:#\d+|#x[0-9A-Fa-f]+|[A-Za-z_][\w.-]*);)")
 _TAG = re.compile(rb"<([A-Za-z_][\w:.-]*)")
 _ASIDE = {b"<!--": b"-->", b"<?": b"?>", b"<!": b">"}
 """The beginnings and ends of what may precede the root element."""
@@ -54,13 +57,14 @@ def parse(data: bytes, source: str) -> tuple[Element, list[Finding]]:
             source, f"the file has {len(data) / 1e6:.0f} MB; give a URDF below {MAX_BYTES / 1e6:.0f} MB"
         )
     findings: list[Finding] = []
-    root = _read(_as_unicode(_BEFORE_XML.sub(b"", data, count=1), source, findings), source, findings)
+    root = read_xml(data, source, findings, ("link", "joint"))
+    _drop_namespace(root, source, findings)
+    if root.tag != "robot":
+        text = f"the root element is <{shortened(str(root.tag))}>, a URDF starts with <robot>"
+        raise Refusal(source, f"{text}; give a URDF, or a MuJoCo model, which starts with <mujoco>")
     if root.getroottree().docinfo.doctype:
         raise Refusal(source, "the file declares a DOCTYPE, which a URDF never needs; remove it")
-    _drop_namespace(root, source, findings)
     _drop_xacro(root, source, findings)
-    if root.tag != "robot":
-        raise Refusal(source, f"the root element is <{shortened(str(root.tag))}>, a URDF starts with <robot>")
     for child in list(root):
         if child.tag not in ("link", "joint", "material"):
             root.remove(child)
@@ -79,22 +83,28 @@ def parse(data: bytes, source: str) -> tuple[Element, list[Finding]]:
     return root, findings
 
 
-def _as_unicode(data: bytes, source: str, findings: list[Finding]) -> bytes:
-    """Returns the document in UTF-8 if it contains Latin-1 without saying so; otherwise unchanged."""
-    declared = re.match(rb"[^>]*encoding=", data[:200])
-    if declared is not None or data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data
+def _as_unicode(data: bytes, source: str, findings: list[Finding]) -> tuple[bytes, str | None]:
+    """Returns the document without what may not precede its declaration, and its encoding; None: the one that
+    it declares. Bytes that are UTF-8 are that whatever the document says, and other bytes are Latin-1 if it
+    does not say what else they are."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in data[:4]:
+        return data, None  # UTF-16
+    data = _BEFORE_XML.sub(b"", data.removeprefix(b"\xef\xbb\xbf"), count=1).rstrip(b"\0 \t\r\n")
     try:
         data.decode()
     except UnicodeDecodeError:
+        declared = _DECLARED.match(data[:200])
+        if declared is not None and not _LATIN_OR_UTF_8.fullmatch(declared[1]):
+            return data, None
         findings.append(Finding("repaired", source, "it is not UTF-8 and was read as Latin-1"))
-        return data.decode("latin-1").encode()
-    return data
+        data = data.decode("latin-1").encode()
+    return data, "utf-8"
 
 
-def parser(recover: bool = False) -> etree.XMLParser:
+def parser(recover: bool = False, encoding: str | None = None) -> etree.XMLParser:
     """Returns a parser that resolves no entity, loads no DTD and downloads nothing."""
     return etree.XMLParser(
+        encoding=encoding,
         resolve_entities=False,
         no_network=True,
         load_dtd=False,
@@ -104,59 +114,73 @@ def parser(recover: bool = False) -> etree.XMLParser:
     )
 
 
-def _read(data: bytes, source: str, findings: list[Finding]) -> Element:
-    """Returns the root element. A document that is not well-formed is read again, as other readers do, if no
-    link and no joint is damaged."""
+def read_xml(
+    data: bytes, source: str, findings: list[Finding], parts: tuple[str, ...] | None = None
+) -> Element:
+    """Returns the root element. A document that is not well-formed is read again, as other readers do, if
+    what it describes is not damaged.
 
+    parts: the children of the root element that may not have a fault; None: nothing may have one. Raises
+    Refusal for a document that cannot be read.
+    """
+    data, encoding = _as_unicode(data, source, findings)
     try:
-        return etree.fromstring(data, parser())
+        return etree.fromstring(data, parser(encoding=encoding))
     except (etree.XMLSyntaxError, ValueError) as error:
         reason = _first_line(error)
-    lenient = parser(recover=True)
+    data, count = _BARE.subn(b"&amp;", data)
+    if count:
+        findings.append(Finding("repaired", source, f"{count} ampersand(s) are not written as &amp;"))
+    lenient = parser(True, encoding)
     try:
         root = etree.fromstring(data, lenient)
     except (etree.XMLSyntaxError, ValueError):
         root = None
     faults = [(fault.line, fault.type) for fault in lenient.error_log]
-    if root is None or len(root) == 0 or any(_damages(root, *fault) for fault in faults):
-        raise Refusal(source, f"this is not well-formed XML ({reason}); correct it or give another URDF file")
-    text = f"it is not well-formed XML ({reason}); no link and no joint is affected"
-    findings.append(Finding("repaired", source, text))
+    if root is None or len(root) == 0 or any(_damages(root, parts, *fault) for fault in faults):
+        raise Refusal(source, f"this is not well-formed XML ({reason}); correct it or give another file")
+    if faults:
+        lost = "no link and no joint is affected" if parts else "nothing is lost"
+        findings.append(Finding("repaired", source, f"it is not well-formed XML ({reason}); {lost}"))
     return root
 
 
-def _damages(root: Element, line: int, kind: int) -> bool:
-    """Whether a fault in this line can have damaged a link or a joint."""
+def _damages(root: Element, parts: tuple[str, ...] | None, line: int, kind: int) -> bool:
+    """Whether a fault in this line can have damaged one of these parts."""
     if kind in _HARMLESS:
         return False
     before = [child for child in root if (child.sourceline or 0) <= line]
-    return not before or before[-1].tag in ("link", "joint")
+    return parts is None or not before or before[-1].tag in parts
 
 
 def _drop_namespace(root: Element, source: str, findings: list[Finding]) -> None:
-    space = root.nsmap.get(None)
+    space = etree.QName(root).namespace
     if space is None:
         return
+    kind = "default namespace" if root.prefix is None else "namespace"
     for element in root.iter(f"{{{space}}}*"):
         element.tag = etree.QName(element).localname
     etree.cleanup_namespaces(root)
-    findings.append(Finding("note", source, f"its default namespace '{shortened(space)}' was left out"))
+    findings.append(Finding("note", source, f"its {kind} '{shortened(space)}' was left out"))
 
 
 def _drop_xacro(root: Element, source: str, findings: list[Finding]) -> None:
     """Removes left-over elements of xacro. Raises Refusal for a template: values of links or joints are still
-    to be computed, or all joints are still to be added."""
+    to be computed, or all joints or some links are still to be added."""
     left_over = [element for element in root.iter() if "xacro" in str(element.tag)]
     for element in left_over:
         parent = element.getparent()
         if parent is not None:
             parent.remove(element)
     unfinished = root.xpath(
-        "boolean(//*[self::link or self::joint or self::parent or self::child][@*[contains(., '${')]])"
+        "boolean(//*[self::link or self::joint or self::parent or self::child]"
+        "[@*[contains(., '${') or contains(., '$(')]])"
     )  # `attrib.values()` takes a time that grows with the square of the number of attributes
-    if unfinished or (left_over and root.find("joint") is None):
-        raise Refusal(source, f"this is a xacro template; {_EXPAND}")
     calls = sum("property" not in str(element.tag) for element in left_over)
+    links = {"", "world", *named(root, "link")}
+    used = {end_of(joint, side) for joint in root.findall("joint") for side in ("parent", "child")}
+    if unfinished or (left_over and root.find("joint") is None) or (calls and not used <= links):
+        raise Refusal(source, f"this is a xacro template; {_EXPAND}")
     if left_over:
         text = f"{len(left_over)} left-over element(s) of xacro were left out"
         text += f"; {calls} of them may have described links, sensors or colours" if calls else ""
@@ -222,7 +246,7 @@ def numbers(
     try:
         values = [float(word) for word in words]
     except ValueError:
-        hint = _XACRO_HINT if "${" in text else ""
+        hint = _XACRO_HINT if "${" in text or "$(" in text else ""
         raise Refusal(where, f"{name} is '{shortened(text)}', not {_count(count)}{hint}") from None
     known = len(words) == count and all(_NUMBER.fullmatch(word) for word in words)
     if not known or not all(math.isfinite(value) for value in values):

@@ -105,16 +105,30 @@ def body_of(root: Element) -> dict[str, str]:
 def _repaired_roots(root: Element) -> Iterator[Finding]:
     """Adds the link `world` if joints use it without its being described, and welds a base that a floating or
     planar joint carries."""
-    carried = parent_joints(root)
+    still = _still(root)
     for joint in root.findall("joint"):
         parent = end_of(joint, "parent")
         if parent == "world" and "world" not in named(root, "link"):
             etree.SubElement(root, "link", name="world")
             yield Finding("filled", label(joint), "its parent link 'world' is not described and was added")
-        if parent not in carried and (kind := joint.get("type")) in ("floating", "planar"):
+        if parent in still and (kind := joint.get("type")) in ("floating", "planar"):
             joint.set("type", "fixed")
             text = f"a {kind} joint carries the base; it was made fixed: only fixed bases can be controlled"
             yield Finding("fixed", label(joint), text)
+
+
+def _still(root: Element) -> set[str]:
+    """Returns the links that no one-axis joint carries, so that they stand still if nothing floats."""
+    carried, below = parent_joints(root), dict[str, list[str]]()
+    for joint in root.findall("joint"):
+        if joint.get("type") not in MOVABLE:
+            below.setdefault(end_of(joint, "parent"), []).append(end_of(joint, "child"))
+    still, ahead = set[str](), [link for link in below if link not in carried]
+    while ahead:
+        link = ahead.pop()
+        ahead += () if link in still else below.get(link, ())
+        still.add(link)
+    return still
 
 
 def _sizes(root: Element, source: str) -> Iterator[Finding]:
@@ -174,6 +188,7 @@ def _types(root: Element, _source: str) -> Iterator[Finding]:
         kind = joint.get("type", "")
         if kind in ("floating", "planar"):
             text = f"a {kind} joint has several axes; only fixed-base robots with one-axis joints work"
+            text += "; make it fixed"
             yield Finding("refused", label(joint), text)
         elif kind not in _KNOWN:
             guesses += 1

@@ -12,7 +12,8 @@ from lxml import etree
 from lxml.etree import _Element as Element
 
 from robots.errors import InputError, shortened
-from robots.urdf.read import named
+from robots.urdf.joints import GRIPPER
+from robots.urdf.read import end_of, named
 from robots.urdf.structure import chains
 
 _NAMES = tuple(
@@ -69,8 +70,8 @@ def choose_tip(root: Element) -> tuple[str, tuple[str, ...]]:
     The tip is at the end of the longest chain of joints that is not a leg. If several chains leave one body
     behind the middle of this chain and behind its fourth joint, they are fingers, and the tip is on that
     body. Frames of fingers, jaws and sensors are used only if there are no others. Frames with names such as
-    `tool0` are preferred, in alphabetical order; otherwise the tip is the last frame, if possible one with
-    more than a collision shape.
+    `tool0` are preferred, in alphabetical order; otherwise the tip is the last frame, if possible one that no
+    joint of a gripper carries, with more than a collision shape.
     """
     carried = chains(root)
     arms = not_legs(root)
@@ -88,7 +89,8 @@ def choose_tip(root: Element) -> tuple[str, tuple[str, ...]]:
         alike = sorted(name for name in hands if pattern.search(name))
         if alike:
             return alike[0], tuple(alike[1:])
-    links = named(root, "link")
+    links, parts = named(root, "link"), _in_gripper(root)
+    hands = [name for name in hands if name not in parts] or hands
     seen = [name for name in hands if not _invisible(links[name])] or hands
     return seen[-1], tuple(seen[:-1])
 
@@ -101,6 +103,21 @@ def not_legs(root: Element) -> list[str]:
     carriers = {carried[leg][:count] for leg in legs for count in range(1, len(carried[leg]))}
     arms = [name for name in carried if name not in legs and carried[name] not in carriers]
     return arms if max((len(carried[name]) for name in arms), default=0) >= 3 else list(carried)
+
+
+def _in_gripper(root: Element) -> set[str]:
+    """Returns the links that joints of a gripper carry, directly or not."""
+    below, ahead = dict[str, list[str]](), list[str]()
+    for joint in root.findall("joint"):
+        child = end_of(joint, "child")
+        below.setdefault(end_of(joint, "parent"), []).append(child)
+        ahead += [child] if joint.get(GRIPPER) is not None else []
+    found = set[str]()
+    while ahead:
+        link = ahead.pop()
+        ahead += () if link in found else below.get(link, ())
+        found.add(link)
+    return found
 
 
 def _invisible(link: Element) -> bool:

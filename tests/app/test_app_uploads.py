@@ -48,7 +48,7 @@ def refusals(page: Wire) -> int:
 
 def taken(page: Wire) -> bool:
     """Returns whether a later file is read; the page then shows the fault of its content."""
-    upload(page, "small", b"\xff")
+    upload(page, "small", b"\xff\0")
     return eventually(lambda: page.shows("is not text"), LONG)
 
 

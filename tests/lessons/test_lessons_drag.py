@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -161,6 +162,12 @@ def test_the_verdict_says_why_a_robot_does_not_follow() -> None:
     text = (FIELD / "mimic_in_chain.urdf").read_text().replace("<robot ", '<robot underactuated="true" ')
     told = str(dragged(load_urdf_text(text.replace('effort="50"', 'effort="1"'))))
     assert "mm away" in told and "'j2' at the torque limit" in told, told
+
+
+def test_the_verdict_names_joints_that_are_too_slow() -> None:
+    text = (FIELD / "no_inertials_7_joints.urdf").read_text()
+    told = str(dragged(load_urdf_text(re.sub('velocity="[^"]*"', 'velocity="0.05"', text))))
+    assert "mm away" in told and "at the speed limit" in told, told
 
 
 def test_what_is_not_good_is_said() -> None:

@@ -52,8 +52,11 @@ def test_files_of_other_people_load_with_a_finding(name: str, words: str) -> Non
         ("<link", "<!-- a -- b --><link", "Double hyphen"),
         ('"0.3 0 0.1"', '"0.3, 0 0.1"', "1 list(s) of numbers had commas"),
         ("</robot>", "<gazebo a='1' b=2><sensor:x/>a & b</gazebo></robot>", "not well-formed"),
+        ("<robot", "\ufeff\n<?xml version='1.0'?>\n<robot", ""),
+        ("</robot>", "</robot>\n\0", ""),
+        ('name="base">', 'name="base"><visual name="a & b"/>', "1 ampersand(s)"),
     ],
-    ids=["before the declaration", "hyphens", "commas", "gazebo"],
+    ids=["before the declaration", "hyphens", "commas", "gazebo", "mark", "zero byte", "ampersand"],
 )
 def test_xml_that_other_readers_accept(before: str, after: str, words: str) -> None:
     assert words in findings(ARM.replace(before, after, 1))
@@ -65,6 +68,25 @@ def test_an_attribute_with_an_undeclared_prefix_is_left_out() -> None:
 
 def test_latin_1_without_saying_so() -> None:
     assert "read as Latin-1" in findings(ARM.replace("<link", "<!-- Größe --><link", 1).encode("latin-1"))
+
+
+@pytest.mark.parametrize("said", ["utf-8", "UTF8", "ascii"])
+def test_another_encoding_than_the_declared_one(said: str) -> None:
+    """Editors keep the declaration of a file that they save in another encoding."""
+    named = f'<?xml version="1.0" encoding="{said}"?>\n' + ARM.replace('name="arm"', 'name="Größe"')
+    canonical, report = canonicalise(named.encode("latin-1"), "mine.urdf")
+    assert canonical is not None and canonical.name == "Größe"
+    assert "read as Latin-1" in str([*map(str, report.findings)])
+    canonical, _ = canonicalise(named.encode(), "mine.urdf")
+    assert canonical is not None and canonical.name == "Größe"
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "gb2312", "cp1252", "latin-1"])
+def test_declared_encodings_are_read(encoding: str) -> None:
+    name = "机器人" if encoding == "gb2312" else "Größe"
+    text = f'<?xml version="1.0" encoding="{encoding}"?>\n' + ARM.replace('name="arm"', f'name="{name}"')
+    canonical, _ = canonicalise(text.encode(encoding), "mine.urdf")
+    assert canonical is not None and canonical.name == name
 
 
 def test_comments_cost_no_time() -> None:
@@ -88,9 +110,12 @@ def test_a_template_is_told_from_left_over_elements() -> None:
     assert "1 of them may have described links, sensors or colours" in findings(left)
     for template in (
         left.replace('name="l1"', 'name="${prefix}l1"'),
+        left.replace('"l1"', '"$(arg prefix)l1"'),
+        left.replace('upper="2"', 'upper="$(arg most)"'),
+        left.replace(link("l2"), f'<xacro:if value="true">{link("l2")}</xacro:if>'),
         f'{call} name="a"><link name="l0"/><xacro:arm prefix="a"/></robot>',
     ):
-        with pytest.raises(InputError, match="xacro template; run `pip install xacro`"):
+        with pytest.raises(InputError, match=r"xacro template[;:] run `pip install xacro`"):
             load(template)
 
 
@@ -106,6 +131,33 @@ def test_a_floating_base_is_welded(kind: str) -> None:
     assert f"a {kind} joint carries the base" in findings(text)
 
 
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_a_floating_base_behind_a_fixed_link_is_welded(kind: str) -> None:
+    ground = joint("stand", "world", "ground", "fixed", "")
+    base = f'<joint name="free" type="{kind}"><parent link="ground"/><child link="base"/></joint>'
+    text = ARM.replace("</robot>", f'{base}<link name="ground"/>{ground}</robot>')
+    assert f"a {kind} joint carries the base" in findings(text)
+    with pytest.raises(InputError, match="make it fixed"):
+        load(ARM.replace('name="j2" type="revolute"', f'name="j2" type="{kind}"'))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('<sdf version="1.6"><model name="m"/></sdf>', "root element is <sdf>.*give a URDF.*<mujoco>"),
+        ("<!DOCTYPE html><html><body>404</body></html>", "root element is <html>"),
+    ],
+)
+def test_a_document_that_is_no_robot_is_told_what_can_be_given(text: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        load(text)
+
+
+def test_a_document_with_a_prefixed_root_is_read() -> None:
+    text = ARM.replace("<robot", '<r:robot xmlns:r="http://x.y"').replace("</robot>", "</r:robot>")
+    assert load(text).n == 2
+
+
 def test_unlimited_speed_and_effort_are_filled() -> None:
     for unlimited in ("inf", "1e16", "3.402823466e+38", "1.7976931348623157e308"):
         text = ARM.replace('velocity="3"', f'velocity="{unlimited}"').replace(
@@ -115,6 +167,12 @@ def test_unlimited_speed_and_effort_are_filled() -> None:
         told = findings(text)
         assert "no velocity limit" in told
         assert "no effort limit" in told
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("revolute", "kg·m²"), ("prismatic", "(sliding joints: kg)")])
+def test_the_report_says_from_what_the_rotors_were_assumed(kind: str, unit: str) -> None:
+    told = str(load(two_joint_arm(j2=joint("j2", "l1", "l2", kind))).report.of_kind("filled"))
+    assert f"{unit} were assumed from what they move and from their torque and speed limits" in told
 
 
 def test_an_effort_that_hardly_holds_the_arm_is_reported_and_kept() -> None:
@@ -173,12 +231,13 @@ def test_position_limits_that_nobody_filled_in() -> None:
     """If most joints have lower = upper = 0, they are unbounded. A single one is held."""
     every = ARM.replace('lower="-2" upper="2"', 'lower="0" upper="0"')
     assert np.isinf(load(every).q_upper).all()
+    assert "1e+06" not in findings(every)
     one = ARM.replace('lower="-2" upper="2"', 'lower="0" upper="0"', 1)
     assert load(one).n == 1
 
 
 def test_a_joint_that_cannot_follow_another_is_held_and_the_report_says_what_is_wrong() -> None:
-    """A follower in front of its leader, or with a range that leaves its leader none, is held."""
+    """A follower with a range that leaves its leader none, or with a strange factor, is held."""
     text = (FIELD / "mimic_in_chain.urdf").read_text()
     assert "'j3': it follows 'j2': -1 · q + 0" in str([*map(str, load_urdf_text(text).report.findings)])
     narrow = text.replace('multiplier="-1" offset="0"', 'multiplier="-1" offset="100"')
@@ -187,10 +246,10 @@ def test_a_joint_that_cannot_follow_another_is_held_and_the_report_says_what_is_
     told = str(arm.report.of_kind("fixed"))
     assert "it should follow 'j2' with factor -1, which is not simulated (its own range leaves its" in told
     assert "leader none): what it carries moves differently on the real robot" in told
-    first = joint("j1", "base", "l1", inside=MIMIC.format("j2", 1, 0))
-    assert "(its leader comes after it in the tree)" in findings_of(
-        ARM.replace(joint("j1", "base", "l1"), first)
-    )
+    strange = text.replace('multiplier="-1"', 'multiplier="1e-9"')
+    assert "(its factor or its offset is out of range)" in findings_of(strange)
+    unknown = text.replace('mimic joint="j2"', 'mimic joint="nobody"')
+    assert "it mimics 'nobody', which does not exist" in findings_of(unknown)
     both = load_robot(FIELD / "mimic_in_chain.urdf", hold=("j2=0.5",))
     assert "not simulated" not in str(both.report.findings)
     np.testing.assert_allclose(
@@ -257,17 +316,33 @@ def test_followers_are_placed_after_the_joints_that_do_not_move_the_tip_are_held
 def test_a_joint_that_carries_an_arm_moves_although_a_rod_follows_it() -> None:
     """A palletising robot: a rod beside the upper arm keeps the hand level. It carries nothing, and the
     joint that it follows is no gripper."""
-    for name, told in (
-        ("rod", "joint 'rod': it follows 'j2': 1 · q + 0"),
-        # Pinocchio sorts joints beside one another by their names, and a follower must come after its leader.
-        ("bar", "joint 'bar': held at 0 rad: it should follow 'j2' with factor 1, which is not simulated"),
+    for name, told, names in (
+        ("rod", "joint 'rod': it follows 'j2': 1 · q + 0", ("j1", "j2", "j3")),
+        # Pinocchio sorts joints beside one another by their names, and the first of them leads.
+        ("bar", "joint 'j2': it follows 'bar': 1 · q + 0", ("j1", "bar", "j3")),
     ):
         rod = joint(name, "l1", "bar", inside=MIMIC.format("j2", 1, 0))
         arm = load_urdf_text(
             two_joint_arm(link("l3") + joint("j3", "l2", "l3", axis="1 0 0") + link("bar") + rod)
         )
-        assert arm.joint_names == ("j1", "j2", "j3")
+        assert arm.joint_names == names
         assert told in " | ".join(map(str, arm.report.findings))
+
+
+@pytest.mark.parametrize("names", [("left_finger_joint", "right_finger_joint"), ("j3", "j4")])
+def test_a_finger_is_no_tip_whatever_its_link_is_called(names: tuple[str, str]) -> None:
+    """The joints say what they carry, by their names or as one follows the other."""
+    one, other = names
+    slide = '<limit lower="0" upper="0.04" velocity="1" effort="9"/>'
+    hand = (
+        link("l3")
+        + link("l4")
+        + joint(one, "l2", "l3", "prismatic", slide)
+        + joint(other, "l2", "l4", "prismatic", f'{slide}<mimic joint="{one}"/>')
+    )
+    arm = load(two_joint_arm(hand))
+    assert (arm.tip, arm.report.tips, arm.n) == ("l2", (), 2)
+    assert "gripper=" not in arm.urdf_text
 
 
 # ------------------------------------------------------------------ joints that are held

@@ -47,7 +47,18 @@ PARALLELOGRAM = robot(
     joint("aside", "l1", "rod", inside=mimic("level", -0.5, 0.1)),
     joint("wrist", "l3", "hand", axis="1 0 0"),
 )
-ROBOTS = pytest.mark.parametrize("text", [TELESCOPE, PARALLELOGRAM], ids=["telescope", "parallelogram"])
+BEFORE = robot(
+    *map(link, ("base", "l1", "l2", "l3", "rod", "hand")),
+    joint("turn", "base", "l1", axis="0 0 1"),
+    joint("low", "l1", "l2", inside=mimic("high", -2.0, 0.3)),
+    joint("high", "l2", "l3", inside='<limit lower="-1" upper="0.5" velocity="1" effort="60"/>'),
+    joint("aside", "l1", "rod", inside=mimic("low", -0.5, 0.1)),
+    joint("wrist", "l3", "hand", axis="1 0 0"),
+)
+"""A follower carries its leader, and another one comes before both in Pinocchio's order, that of names."""
+ROBOTS = pytest.mark.parametrize(
+    "text", [TELESCOPE, PARALLELOGRAM, BEFORE], ids=["telescope", "parallelogram", "before"]
+)
 
 
 def posture(arm: Robot) -> np.ndarray:
@@ -74,6 +85,28 @@ def test_a_leader_keeps_the_limits_of_its_followers() -> None:
     assert "joint 'further': it follows 'out': 1 · q + 0" in told
     assert "joint 'out': its range is cut to [0, 0.4], so that joint 'further'" in told
     assert "joint 'out': its velocity limit is 0.5" in told
+
+
+def test_a_joint_that_comes_before_its_leader_leads_it() -> None:
+    """aside = 0.1 − 0.5 low and low = 0.3 − 2 high, so that high = (low − 0.3) / −2 with low = (aside −
+    0.1) / −0.5: the first joint has the coordinate, and the motion is that of the file."""
+    arm = load(BEFORE)
+    assert arm.joint_names == ("turn", "aside", "wrist")
+    told = " | ".join(map(str, arm.report.findings))
+    assert "not simulated" not in told and "joint 'aside': it leads 'high', which the file says it" in told
+    plain = load(BEFORE.replace("<mimic", "<other"))
+    high = 0.2
+    low = 0.3 - 2.0 * high
+    aside = 0.1 - 0.5 * low
+    values = {"turn": 0.3, "low": low, "high": high, "aside": aside, "wrist": -0.4}
+    q = np.array([values[name] for name in plain.joint_names])
+    for frame in ("rod", "hand"):
+        moved = at(arm, frame, np.array([0.3, aside, -0.4]))
+        np.testing.assert_allclose(moved.homogeneous, at(plain, frame, q).homogeneous, atol=1e-12)
+    # high is in [-1, 0.5] with 1 rad/s and 60 N·m, and aside = high - 0.05.
+    np.testing.assert_allclose((arm.q_lower[1], arm.q_upper[1]), (-1.05, 0.45), atol=1e-9)
+    assert arm.v_limit[1] == pytest.approx(1.0) and arm.tau_limit[1] == pytest.approx(60.0)
+    assert arm.n == load_urdf_text(arm.urdf_text).n
 
 
 def test_a_follower_of_a_follower_has_the_factor_and_the_offset_of_both() -> None:

@@ -369,6 +369,26 @@ def test_ranges_in_radians_without_a_word_of_it() -> None:
     assert not told.report.of_kind("repaired")
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ("<mujoco", "<!-- Größe --><mujoco", "read as Latin-1"),
+        ("<mujoco", "\n<?xml version='1.0'?>\n<mujoco", ""),
+        ("<default>", "<!-- a -- b --><default>", "nothing is lost"),
+        ('name="upper"', 'name="a & b"', "1 ampersand(s)"),
+    ],
+    ids=["latin-1", "before the declaration", "hyphens", "ampersand"],
+)
+def test_xml_that_mujoco_accepts(before: str, after: str, told: str) -> None:
+    text = ARM.replace(before, after, 1)
+    assert text != ARM
+    arm = import_robot(text.encode("latin-1"), "arm.xml").used()
+    assert arm.n == loaded(ARM).n
+    assert told in " | ".join(map(str, arm.report.findings))
+    with pytest.raises(InputError, match="not well-formed"):
+        loaded(ARM.replace("</body>", "", 1))
+
+
 def test_a_model_that_grows_without_end_is_refused() -> None:
     many = '<replicate count="100000" offset="0 0 1"><body><joint/><geom size="0.1"/></body></replicate>'
     with pytest.raises(InputError):

@@ -131,9 +131,15 @@ def test_a_folder_stands_in_for_a_package_of_another_name() -> None:
 
 def test_where_a_mesh_is_looked_for_at_last(tmp_path) -> None:
     """Without the package's name, then in the folder `meshes` beside the URDF; never outside `within`."""
-    for name in ("own/robot/urdf", "own/robot/meshes", "own/parts"):
+    for name in ("own/robot/urdf", "own/robot/meshes/fine", "own/parts"):
         (tmp_path / name).mkdir(parents=True)
-    for name in ("own/robot/meshes/a.stl", "own/robot/urdf/b.stl", "own/parts/c.stl", "d.stl"):
+    for name in (
+        "own/robot/meshes/a.stl",
+        "own/robot/urdf/b.stl",
+        "own/parts/c.stl",
+        "d.stl",
+        "own/robot/meshes/fine/e.stl",
+    ):
         (tmp_path / name).write_bytes(b"solid a")
     own = tmp_path / "own"
     for uri, there in (
@@ -142,6 +148,11 @@ def test_where_a_mesh_is_looked_for_at_last(tmp_path) -> None:
         ("file:///home/somebody/ws/a.stl", True),
         ("C:\\somebody\\b.stl", True),
         ("package://x/parts/c.stl", True),
+        ("file:///opt/ros/jazzy/share/x/meshes/fine/e.stl", True),
+        ("/home/somebody/ws/x/meshes/fine/e.stl", True),
+        ("file://$(find x)/meshes/fine/e.stl", True),
+        ("package://x/meshes/fine/e%2estl", True),
+        ("package://x/../../../d.stl", False),
         ("package://x/d.stl", False),
         ("package://x/nowhere.stl", False),
     ):

@@ -22,7 +22,7 @@ from robots import CATALOG, InputError
 
 _KINDS = {"repaired": LEVELS[0], "filled": LEVELS[1], "fixed": LEVELS[3], "refused": BAD, "note": DAMPING}
 _UPLOADED = ".urdf,.xml,.zip,application/xml,text/xml,application/zip"
-_ZIP = b"PK"  # the first bytes of a zip
+_READABLE = b"PK", b"\xff\xfe", b"\xfe\xff"  # the first bytes of a zip and of UTF-16
 MAX_UPLOAD = 10_000_000  # bytes: the largest file that the importer reads
 
 
@@ -89,7 +89,8 @@ class RobotPanel:
             upload = gui.add_upload_button("Upload a URDF", mime_type=_UPLOADED)
             gui.add_html(
                 block(
-                    "A zip of the robot's folder brings its meshes along. Without them, capsules are drawn."
+                    "Or drop a file here. The robot's folder, or a zip of it, brings its meshes along; "
+                    "without them, capsules are drawn."
                 )
             )
         if own_files is not None:
@@ -192,12 +193,10 @@ class RobotPanel:
         if len(content) > MAX_UPLOAD:
             self.refuse(f"The file has more than {MAX_UPLOAD // 1_000_000} MB; choose a smaller one.")
             return
-        try:
-            text = content if content.startswith(_ZIP) else content.decode("utf-8")
-        except UnicodeDecodeError:
+        if b"\0" in content and not content.startswith(_READABLE):
             self.refuse("The file is not text: upload the URDF file itself, or a zip of the robot's folder.")
             return
-        self._ask(answer, run, text)
+        self._ask(answer, run, content)
 
     def _wait(self, answer: viser.GuiHtmlHandle) -> None:
         """Shows that a request is in progress. `answer` is the text above the control that was used; a text

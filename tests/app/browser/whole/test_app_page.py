@@ -316,6 +316,39 @@ def test_wrong_robots_are_one_sentence_and_uploads_work(
     assert eventually(page, lambda: learner.status is not None and learner.status.t > 0.3)
 
 
+def test_a_folder_and_a_file_are_dropped_on_the_robot_tab(
+    page: Page, learner: SimulationClient, tmp_path: Path
+) -> None:
+    """The folder's mesh comes along, in a zip that the browser makes; the file is in Latin-1."""
+    text = CATALOG["planar3"].path.read_text()
+    folder = tmp_path / "mine"
+    for name in ("urdf", "meshes"):
+        (folder / name).mkdir(parents=True)
+    mesh = "o\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    (folder / "meshes" / "part.obj").write_text(mesh + "# a comment\n" * 5000)
+    visual = '<visual><geometry><mesh filename="package://mine/meshes/part.obj"/></geometry></visual>'
+    at = text.index(">", text.index("<link", text.index("<link") + 1)) + 1
+    (folder / "urdf" / "arm.urdf").write_text(text[:at] + visual + text[at:])
+    tab(page, "Robot")
+    _drop(page, folder)
+    assert eventually(page, lambda: learner.ready is not None and bool(learner.ready.robot.surfaces))
+    assert learner.ready is not None and "not found" not in str(learner.ready.robot.report.findings)
+    (tmp_path / "Größe.urdf").write_bytes(
+        text.replace('name="planar3"', 'name="Größe"').encode("latin-1", "replace")
+    )
+    expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()
+    tab(page, "Robot")
+    _drop(page, tmp_path / "Größe.urdf")
+    assert eventually(page, lambda: learner.ready is not None and learner.ready.robot.name == "Größe")
+
+
+def _drop(page: Page, path: Path) -> None:
+    browser = page.context.new_cdp_session(page)
+    dragged = {"items": [], "files": [str(path)], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        browser.send("Input.dispatchDragEvent", {"type": kind, "x": 200, "y": 200, "data": dragged})
+
+
 def _upload(page: Page, path: Path) -> None:
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Upload a URDF").click()
