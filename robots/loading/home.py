@@ -29,7 +29,8 @@ def find_home(
 
     The configuration maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖², first over samples and
     then by random steps; the linear part of J is divided by the reach, and σ_min is the least singular value
-    that is not zero everywhere, as some are for a planar arm. The result is deterministic. Joints
+    of J and of its linear part that is not zero everywhere, as some are for a planar arm. (With six
+    independent joints, that of J is the smaller one.) The result is deterministic. Joints
     that do not move the frame are at the middle of their range (unbounded joints at 0). A chain that reaches
     below the floor (z = 0, or the height of the first joint if lower) gets a lower score, and so does a frame
     that is less than an eighth of the reach above it, or lower than `least_height`, m: one could not drag it
@@ -49,15 +50,17 @@ def find_home(
     floor = min(0.0, float(data.oMi[chain[0]].translation[2]))
     least_height = max(least_height, floor + _ROOM * reach)
 
-    def singular_values(q: np.ndarray) -> np.ndarray:
+    def singular_values(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # For a single joint Pinocchio returns the Jacobian as a one-dimensional array.
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, model.nv)
         jacobian = J[:, moving]
         jacobian[:3] /= reach
-        return np.linalg.svd(jacobian, compute_uv=False)
+        return np.linalg.svd(jacobian, compute_uv=False), np.linalg.svd(jacobian[:3], compute_uv=False)
 
     def score(q: np.ndarray) -> float:
-        singular = singular_values(q)[:rank]
+        singular = min(
+            float(each[rank - 1]) for each, rank in zip(singular_values(q), ranks, strict=True) if rank
+        )
         pin.forwardKinematics(model, data, q)
         tip = pin.updateFramePlacement(model, data, frame)
         heights = [float(data.oMi[j].translation[2]) for j in chain]
@@ -69,7 +72,7 @@ def find_home(
         below = 8.0 * max(0.0, floor - lowest, least_height - height) / reach
         load = np.abs(pin.computeGeneralizedGravity(model, data, q)) / model.effortLimit
         heavy = 8.0 * float(np.clip(load - _HOLDS, 0.0, 1.0).sum())
-        easy = float(np.log(singular.min() + 1e-9) + 0.5 * np.log(max(margin, 1e-9)))
+        easy = float(np.log(singular + 1e-9) + 0.5 * np.log(max(margin, 1e-9)))
         return easy - bend - below - heavy + elbow
 
     samples = sample_configurations(
@@ -77,7 +80,7 @@ def find_home(
     )
     full = np.tile(middle, (_CANDIDATES, 1))
     full[:, moving] = samples[:, moving]
-    rank = max(int((singular_values(q) > _SINGULAR).sum()) for q in full)
+    ranks = np.max([[(each > _SINGULAR).sum() for each in singular_values(q)] for q in full], axis=0)
     best = max((*full, middle), key=score)
     best_score = score(best)
     rng = np.random.default_rng(seed)

@@ -213,6 +213,15 @@ def test_the_home_of_a_planar_arm_is_bent() -> None:
     assert np.abs(arm.home[1:]).max() > 0.3, arm.home
 
 
+def test_the_home_of_an_arm_with_three_joints_is_not_stretched() -> None:
+    """It stood upright: its joints turn the hand independently there, but the first one does not move it."""
+    arm = load_robot(FIELD / "world_not_declared.urdf")
+    J = pin.computeFrameJacobian(
+        arm.model, arm.model.createData(), arm.home, arm.frame_id(arm.tip), pin.LOCAL_WORLD_ALIGNED
+    )
+    assert np.linalg.svd(J[:3])[1][1] > 0.1, arm.home  # m: the tip moves in two directions
+
+
 def test_masses_that_are_put_there_are_not_heavier_than_the_motors_carry() -> None:
     """Shapes are often drawn thicker than the robot; the effort limits of the file are known."""
     thick = '<collision><geometry><cylinder radius="0.2" length="0.6"/></geometry></collision>'
