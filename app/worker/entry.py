@@ -14,7 +14,7 @@ def warm(say: Callable[[str], None]) -> None:
 
     compile_all(
         lambda ready, of: say(
-            f"compiling the controllers, only this time, for about a minute: {ready} of {of} functions"
+            f"compiling the controllers, only this time, for about half a minute: {ready} of {of} functions"
         )
     )
     from app.worker.main import rehearse

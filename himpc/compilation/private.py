@@ -183,7 +183,7 @@ class _FirstWord(event.Listener):
         if not self._said:
             self._said = True
             getLogger(__name__).warning(
-                "compiling the controller's inner loops once: this takes about a minute"
+                "compiling the controller's inner loops once: this takes about half a minute"
             )
 
     def on_start(self, event: Any) -> None:

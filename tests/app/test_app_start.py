@@ -103,13 +103,13 @@ class Unborn(Process):
 
     @property
     def preparing(self) -> str:
-        return "compiling the controllers, only this time, for about a minute: 3 of 40 functions"
+        return "compiling the controllers, only this time, for about half a minute: 3 of 40 functions"
 
 
 def test_a_page_says_at_once_what_is_compiled() -> None:
     trouble = trouble_of(Unborn(), loading=False, quiet=0.1)
     assert trouble is not None and trouble.offer is None
-    assert "about a minute: 3 of 40 functions, 0 s so far" in trouble.sentence
+    assert "about half a minute: 3 of 40 functions, 0 s so far" in trouble.sentence
 
 
 class First(Wire):
