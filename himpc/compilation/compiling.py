@@ -82,7 +82,7 @@ def compiled_functions() -> dict[str, frozenset[str]]:
 
 def _decorated(tree: ast.Module) -> list[str]:
     """Returns the functions of a module whose decorator is imported from `himpc.compilation.compiled`, also
-    those that are made by a call of the decorator: `name: type = decorator(…)`."""
+    those that are given to a call of the decorator: `other_name = decorator(name)`."""
     imported = {
         alias.asname or alias.name
         for node in tree.body
@@ -95,15 +95,16 @@ def _decorated(tree: ast.Module) -> list[str]:
         if isinstance(node, ast.FunctionDef)
         and any(_called(decorator) in imported for decorator in node.decorator_list)
     ]
-    made = [
-        node.target.id
+    given = [
+        argument.id
         for node in tree.body
-        if isinstance(node, ast.AnnAssign)
-        and isinstance(node.target, ast.Name)
+        if isinstance(node, ast.Assign)
         and isinstance(node.value, ast.Call)
         and _called(node.value) in imported
+        for argument in node.value.args
+        if isinstance(argument, ast.Name)
     ]
-    return decorated + made
+    return decorated + given
 
 
 def _called(decorator: ast.expr) -> str:

@@ -158,9 +158,9 @@ def test_a_robot_follows_a_target_that_is_dragged_slowly(
 
 
 def test_the_verdict_says_why_a_robot_does_not_follow() -> None:
-    """An arm with links of 1 kg has motors of 1 N m: it cannot hold itself; the verdict names them."""
+    """An arm with links of 1 kg has motors of 0.6 N m: it cannot hold itself; the verdict names them."""
     text = (FIELD / "mimic_in_chain.urdf").read_text().replace("<robot ", '<robot underactuated="true" ')
-    told = str(dragged(load_urdf_text(text.replace('effort="50"', 'effort="1"'))))
+    told = str(dragged(load_urdf_text(text.replace('effort="50"', 'effort="0.6"'))))
     assert "mm away" in told and "'j2' at the torque limit" in told, told
 
 
