@@ -67,7 +67,7 @@ class Ground:
             cast_shadow=False,
             receive_shadow=False,
         )
-        self._shown = np.full((1, 3), np.nan)
+        self._shown = self._heights = np.full(1, np.nan)
 
     def paint(self, dark: bool) -> None:
         """Sets the colours of the grid lines, which are less conspicuous than the robot on every
@@ -78,27 +78,26 @@ class Ground:
 
     def move(self, poses: np.ndarray) -> None:
         """poses: (J, 7), position, m, and quaternion of all joints and of the tip."""
-        at = poses[:, :3]
-        if (np.abs(at - self._shown) <= _SHADOW_STILL).all():
-            return
-        self._shown = at.copy()
-        start, end = at[self._ends[:, :1]], at[self._ends[:, 1:]]
+        start, end = poses[self._ends[:, :1], :3], poses[self._ends[:, 1:], :3]
         points = (start + self._share * (end - start)).reshape(-1, 3)
+        if not (np.abs(points - self._shown) <= _SHADOW_STILL).all():
+            self._shown = points
+            at = np.tile(points, (len(_RINGS), 1))
+            at[:, 2] = _APART * np.arange(1, len(at) + 1)
+            self._discs.batched_positions = at.astype(np.float32)
         height = np.maximum(points[:, 2], 0.0)
-        size = np.outer(_RINGS, _DISC + _WIDER * height)
-        points = np.tile(points * (1.0, 1.0, 0.0), (len(_RINGS), 1))
-        points[:, 2] = _APART * np.arange(1, len(points) + 1)
-        self._discs.batched_positions = points.astype(np.float32)
-        self._discs.batched_scales = size.ravel().astype(np.float32)
-        faint = _DARK * (_DISC / (_DISC + _WIDER * height)) ** 2
-        self._discs.batched_opacities = np.tile(faint, len(_RINGS)).astype(np.float32)
+        if not (np.abs(height - self._heights) <= _SAME_HEIGHT).all():
+            self._heights, radius = height, _DISC + _WIDER * height
+            self._discs.batched_scales = np.outer(_RINGS, radius).ravel().astype(np.float32)
+            faint = _DARK * (_DISC / radius) ** 2
+            self._discs.batched_opacities = np.tile(faint, len(_RINGS)).astype(np.float32)
 
 
-_DISCS = 4  # below each part of the arm
-_RINGS = (0.5, 0.75, 1.0)  # radii of the discs at one point, for a soft edge
+_DISCS = 3  # below each part of the arm
+_RINGS = (0.6, 1.0)  # radii of the discs at one point, for a soft edge
 _DISC, _WIDER = 0.08, 0.12  # m, radius at the floor; its growth with the height
-_DARK = 0.06  # opacity of a disc at the floor
-_SHADOW_STILL = 2e-3  # m
+_DARK = 0.1  # opacity of a disc at the floor
+_SHADOW_STILL, _SAME_HEIGHT = 4e-3, 2e-2  # m, of points along the arm; smaller changes are not sent
 _APART = 2e-4  # m, between two discs, which would flicker at the same height
 
 
