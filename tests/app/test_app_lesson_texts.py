@@ -17,7 +17,7 @@ from app.html.markdown import explained, rendered, rendered_line, split, word_co
 from app.html.palette import GHOST
 from app.html.text import figure, formula, joints_named, readable
 from app.link.exercise import Lecture, LessonPlace, Predict, SignalCurve
-from app.panels.lesson.cards import GROUPS, PATHS, belonging_to, card, exercise_cards
+from app.panels.lesson.cards import GROUPS, PATHS, belonging_to, card, exercise_cards, glyph
 from app.panels.lesson.claims import pictures, state
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
@@ -63,6 +63,7 @@ def test_progress_survives_the_browser_and_whatever_stands_there() -> None:
 def test_every_lesson_is_in_one_group_and_the_paths_fit_their_time() -> None:
     grouped = [name for _, names in GROUPS.values() for name in names]
     assert sorted(grouped) == sorted(COURSE) and all(names for _, names in GROUPS.values())
+    assert len({glyph(name) for name in COURSE}) == len(COURSE), "every lesson has its own picture"
     minutes = {words: sum(load_lesson(name).card.minutes for name in names) for words, names in PATHS.items()}
     assert minutes["Ten minutes"] <= 10 and minutes["An hour"] <= 60
 
