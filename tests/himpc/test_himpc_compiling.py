@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from himpc.compilation.compiled import VECTOR, WHOLE, intermediate
+from himpc.compilation.compiled import VECTOR, WHOLE, intermediate, plain
 from himpc.compilation.compiling import LARGEST, compile_all, compiled_functions
 from himpc.compilation.sources import sources_of
 from himpc.tick.kernel.linear import dot
@@ -200,7 +200,7 @@ def test_all_that_is_compiled_in_is_part_of_what_is_kept() -> None:
     checked: set[Path] = set()
     for module, names in compiled_functions().items():
         loaded = import_module(module)
-        found = sources_of(getattr(loaded, next(iter(names)).rpartition(".")[2]).py_func)
+        found = sources_of(plain(getattr(loaded, next(iter(names)).rpartition(".")[2])))
         assert imported(Path(str(loaded.__file__)), set()) <= set(found)
         checked.update(found)
     assert ROOT / "himpc" / "constants.py" in checked
