@@ -9,14 +9,13 @@ The program runs a server and, in a process of their own, K clients that use the
 lines of JSON. The exit code is 1 if there are faults.
 
 First form: in the first ten minutes (or the first half of a shorter run) the robots run at 2 · X times real
-time and fill the histories for playback and export. This phase lasts until every robot has run for 140 s
-of simulated time. After the M minutes one client reloads its page N times. The memory of the server
-and of its children may then have grown by at most 5 % since the histories were full, the numbers of threads
-and handles must be the same as before, and 100 reloads may cost at most 5 MB. The measured memory is the
-memory that a process has written and does not share with other processes. Free memory is returned to the
-system first. Otherwise the memory that an allocator keeps would vary by more than a leak adds. The pages of
-libraries are not counted: their memory also varies, because they are shared only as long as another program
-uses them.
+time and fill the histories for playback and export. This phase lasts until the recording of every robot is
+full. After the M minutes one client reloads its page N times. The memory of the server and of its children
+may then have grown by at most 5 % since the histories were full, the numbers of threads and handles must be
+the same as before, and 100 reloads may cost at most 5 MB. The measured memory is the memory that a process
+has written and does not share with other processes. Free memory is returned to the system first. Otherwise
+the memory that an allocator keeps would vary by more than a leak adds. The pages of libraries are not
+counted: their memory also varies, because they are shared only as long as another program uses them.
 
 With --every, each learner opens another scene, starts a ghost or ends it every S seconds, at random, after
 all have opened every scene once. The simulations run at X times real time, so that a small machine can run
@@ -44,7 +43,6 @@ from statistics import median
 
 import psutil
 
-from app.client.recording import KEPT, MOST, RATE
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load, Speed
@@ -124,7 +122,7 @@ def lasting(
     fill = min(FILL, options.minutes / 2)
     go(learners, 2.0 * options.speed)
     watched(fill, viewers.pid)
-    while not all(simulated(each) > KEPT + MOST / RATE for each in learners):
+    while not all(each.read(lambda recording: recording.full) for each in learners):
         time.sleep(EVERY)
     go(learners, 1.0)
     later = watched(options.minutes - fill, viewers.pid, fill)

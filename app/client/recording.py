@@ -209,6 +209,12 @@ class Recording:
         self._bits[slot] |= np.bitwise_or.reduce(bits, axis=0)
         self._bucket = bucket
 
+    @property
+    def full(self) -> bool:
+        """Whether further rows need no further memory. A slow page loses rows of a fast simulation, and its
+        recording is full later."""
+        return self._stored >= _MINUTE + MOST
+
     # ---------------------------------------------------------------- looking back
 
     @property

@@ -191,6 +191,7 @@ def test_the_figures_count_every_tick_of_the_run(recording: Recording, layout: L
 
 def test_a_recording_of_any_length_stays_small_and_exact(recording: Recording, layout: Layout) -> None:
     for minute in range(8):
+        assert recording.full == (minute > 2)  # of 14,000 rows a minute has 6,000
         times = 60.0 * minute + 0.002 * np.arange(30_000)
         recording.take(rows_at(layout, times, "step_us", times**2))
     minute, whole = recording.minute(), recording.whole()
