@@ -4,7 +4,7 @@ axis."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from lxml import etree
 from lxml.etree import _Element as Element
@@ -71,6 +71,18 @@ def parent_joints(root: Element) -> dict[str, Element]:
     return {end_of(joint, "child"): joint for joint in root.findall("joint")}
 
 
+def reached(links: Iterable[str], joints: Iterable[Element]) -> set[str]:
+    """Returns some links, and all links that these joints connect to them on the way to the tips."""
+    below, found, ahead = dict[str, list[str]](), set[str](), list(links)
+    for joint in joints:
+        below.setdefault(end_of(joint, "parent"), []).append(end_of(joint, "child"))
+    while ahead:
+        link = ahead.pop()
+        ahead += () if link in found else below.get(link, ())
+        found.add(link)
+    return found
+
+
 def chains(root: Element) -> dict[str, tuple[str, ...]]:
     """Returns, for every link, the names of the moving joints that carry it, from the base on."""
     carriers = parent_joints(root)
@@ -119,16 +131,8 @@ def _repaired_roots(root: Element) -> Iterator[Finding]:
 
 def _still(root: Element) -> set[str]:
     """Returns the links that no one-axis joint carries, so that they stand still if nothing floats."""
-    carried, below = parent_joints(root), dict[str, list[str]]()
-    for joint in root.findall("joint"):
-        if joint.get("type") not in MOVABLE:
-            below.setdefault(end_of(joint, "parent"), []).append(end_of(joint, "child"))
-    still, ahead = set[str](), [link for link in below if link not in carried]
-    while ahead:
-        link = ahead.pop()
-        ahead += () if link in still else below.get(link, ())
-        still.add(link)
-    return still
+    others = [joint for joint in root.findall("joint") if joint.get("type") not in MOVABLE]
+    return reached({end_of(joint, "parent") for joint in others} - parent_joints(root).keys(), others)
 
 
 def _sizes(root: Element, source: str) -> Iterator[Finding]:

@@ -14,7 +14,7 @@ from lxml.etree import _Element as Element
 from robots.errors import InputError, shortened
 from robots.urdf.joints import GRIPPER
 from robots.urdf.read import end_of, named
-from robots.urdf.structure import chains
+from robots.urdf.structure import chains, reached
 
 _NAMES = tuple(
     re.compile(pattern, re.IGNORECASE)
@@ -107,17 +107,8 @@ def not_legs(root: Element) -> list[str]:
 
 def _in_gripper(root: Element) -> set[str]:
     """Returns the links that joints of a gripper carry, directly or not."""
-    below, ahead = dict[str, list[str]](), list[str]()
-    for joint in root.findall("joint"):
-        child = end_of(joint, "child")
-        below.setdefault(end_of(joint, "parent"), []).append(child)
-        ahead += [child] if joint.get(GRIPPER) is not None else []
-    found = set[str]()
-    while ahead:
-        link = ahead.pop()
-        ahead += () if link in found else below.get(link, ())
-        found.add(link)
-    return found
+    joints = root.findall("joint")
+    return reached((end_of(joint, "child") for joint in joints if joint.get(GRIPPER) is not None), joints)
 
 
 def _invisible(link: Element) -> bool:
